@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The "Cage Rig" Geometry Nodes modifier on a skin, its feed, and the modifiers it stands in for.
+
+The feed is a FLOAT_VECTOR point attribute, one per rig, that the modifier's Set Position reads: base coordinates
+are never written. The modifier also takes the rest cage and the posed cage as object inputs, which is what makes
+Blender evaluate them (and, through a constraint on the posed cage, every bone) when they are hidden.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from .. import compat
+from .positions import Points
+
+NAME = "Cage Rig"
+ATTRIBUTE = "cage_rig.posed"
+# Modifiers that move vertices and never add or remove any: they may stand before ours.
+DEFORM_ONLY = {
+    "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP",
+    "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH", "SURFACE_DEFORM", "WARP", "WAVE", "CLOTH",
+    "COLLISION", "SOFT_BODY", "UV_PROJECT", "UV_WARP", "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX",
+    "VERTEX_WEIGHT_PROXIMITY", "NORMAL_EDIT", "WEIGHTED_NORMAL", "DATA_TRANSFER", "MESH_CACHE",
+}  # fmt: skip
+
+
+def node_group() -> bpy.types.NodeTree:
+    """The shared node group, made on first use."""
+    for group in bpy.data.node_groups:
+        if group.get("cage_rig") and group.library is None:
+            return group
+    group = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
+    group["cage_rig"] = True
+    group.is_modifier = True
+    new = group.interface.new_socket
+    new("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    new("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    new("Attribute", in_out="INPUT", socket_type="NodeSocketString")
+    for name in ("Rest Cage", "Posed Cage"):
+        new(name, in_out="INPUT", socket_type="NodeSocketObject")
+    nodes, links = group.nodes, group.links
+    source, target = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput")
+    named, place = nodes.new("GeometryNodeInputNamedAttribute"), nodes.new("GeometryNodeSetPosition")
+    named.data_type = "FLOAT_VECTOR"
+    links.new(source.outputs["Geometry"], place.inputs["Geometry"])
+    links.new(source.outputs["Attribute"], named.inputs["Name"])
+    links.new(named.outputs["Exists"], place.inputs["Selection"])
+    links.new(named.outputs["Attribute"], place.inputs["Position"])
+    links.new(place.outputs["Geometry"], target.inputs["Geometry"])
+    for column, node in enumerate((source, named, place, target)):
+        node.location = (column * 200, 0)
+    return group
+
+
+def find(skin: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The skin's Cage Rig modifier, or None."""
+    for modifier in skin.modifiers:
+        if modifier.type == "NODES" and modifier.node_group and modifier.node_group.get("cage_rig"):
+            return modifier
+    return None
+
+
+def input_object(modifier: bpy.types.Modifier, name: str) -> bpy.types.Object | None:
+    """The object set in an input of our modifier ("Rest Cage" or "Posed Cage")."""
+    return compat.modifier_input(modifier, _identifier(modifier.node_group, name))
+
+
+def add(skin: bpy.types.Object, rest_cage: bpy.types.Object, posed_cage: bpy.types.Object, index: int) -> None:
+    """Add our modifier to the skin at place `index` of its stack."""
+    modifier = skin.modifiers.new(NAME, "NODES")
+    modifier.node_group = node_group()
+    modifier.show_in_editmode = True
+    connect(modifier, rest_cage, posed_cage)
+    skin.modifiers.move(len(skin.modifiers) - 1, index)
+
+
+def connect(modifier: bpy.types.Modifier, rest_cage: bpy.types.Object, posed_cage: bpy.types.Object) -> None:
+    """Set the inputs of our modifier."""
+    values = {"Attribute": ATTRIBUTE, "Rest Cage": rest_cage, "Posed Cage": posed_cage}
+    for name, value in values.items():
+        compat.set_modifier_input(modifier, _identifier(modifier.node_group, name), value)
+
+
+def _identifier(group: bpy.types.NodeTree, name: str) -> str:
+    return next(
+        item.identifier
+        for item in group.interface.items_tree
+        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+    )
+
+
+def write(skin: bpy.types.Object, points: Points) -> None:
+    """Feed posed coordinates (`#M by 3`, the skin's own space) to the modifier. Not in Edit Mode of the skin."""
+    mesh = skin.data
+    attribute = mesh.attributes.get(ATTRIBUTE)
+    if attribute is None:
+        attribute = mesh.attributes.new(ATTRIBUTE, "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
+    mesh.update_tag()
+
+
+def remove(skin: bpy.types.Object) -> None:
+    """Take our modifier and its feed off the skin, and the node group when nothing uses it any more."""
+    modifier = find(skin)
+    if modifier is not None:
+        group = modifier.node_group
+        skin.modifiers.remove(modifier)
+        if group.users == 0:
+            bpy.data.node_groups.remove(group)
+    if skin.data is not None and ATTRIBUTE in skin.data.attributes:
+        skin.data.attributes.remove(skin.data.attributes[ATTRIBUTE])
+
+
+def set_shown(skin: bpy.types.Object, shown: bool) -> None:
+    """Show or hide our modifier, in viewport and render."""
+    modifier = find(skin)
+    if modifier is not None and (modifier.show_viewport, modifier.show_render) != (shown, shown):
+        modifier.show_viewport = modifier.show_render = shown
+
+
+def suspend_armature(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    """Switch off Armature modifiers of `armature`, which would deform twice, and remember how they were."""
+    for modifier in obj.modifiers:
+        if modifier.type == "ARMATURE" and modifier.object == armature:
+            if modifier.name not in obj.cage_rig.suspended:
+                record = obj.cage_rig.suspended.add()
+                record.name = modifier.name
+                record.show_viewport, record.show_render = modifier.show_viewport, modifier.show_render
+            modifier.show_viewport = modifier.show_render = False
+
+
+def show_suspended(obj: bpy.types.Object, shown: bool) -> None:
+    """While a rig is paused its suspended modifiers do their work again (`shown`), as they were before the bind."""
+    for record in obj.cage_rig.suspended:
+        modifier = obj.modifiers.get(record.name)
+        if modifier is not None:
+            modifier.show_viewport = shown and record.show_viewport
+            modifier.show_render = shown and record.show_render
+
+
+def restore_suspended(obj: bpy.types.Object) -> None:
+    """Put suspended modifiers back as they were, and forget them."""
+    show_suspended(obj, True)
+    obj.cage_rig.suspended.clear()
+
+
+def place(skin: bpy.types.Object, armature: bpy.types.Object) -> int:
+    """Where our modifier belongs in the skin's stack: at the armature's modifier, else before all others."""
+    for index, modifier in enumerate(skin.modifiers):
+        if modifier.type == "ARMATURE" and modifier.object == armature:
+            return index
+    return 0
+
+
+def changes_count_before(skin: bpy.types.Object, index: int) -> str | None:
+    """The name of a shown modifier before `index` that may add or remove vertices, or None."""
+    for modifier in list(skin.modifiers)[:index]:
+        if modifier.type not in DEFORM_ONLY and (modifier.show_viewport or modifier.show_render):
+            return modifier.name
+    return None
+
+
+def release(skin: bpy.types.Object) -> None:
+    """Give a skin back as it was before the bind: our modifier and feed off, its Armature modifier on again."""
+    remove(skin)
+    restore_suspended(skin)
+    skin.property_unset("cage_rig")

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Vertex positions and faces of meshes, as arrays. Rows are vertices; coordinates are in the object's own space."""
+
+from __future__ import annotations
+
+import bmesh
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float32]
+
+
+def read_base(mesh: bpy.types.Mesh) -> Points:
+    """Base coordinates, `#V by 3`. Any mode but Edit Mode (there they are as they were when it began)."""
+    points = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def read_evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points:
+    """Coordinates after shape keys and modifiers in `depsgraph`, `#V by 3`. Not for objects in Edit Mode."""
+    return read_base(obj.evaluated_get(depsgraph).data)
+
+
+def read_edit_mesh(mesh: bpy.types.Mesh) -> Points:
+    """Coordinates of the edit mesh (the active shape key alone), `#V by 3`. Edit Mode only.
+
+    There is no bulk access to an edit mesh in Blender; cages are small, skins are never read this way.
+    """
+    edit = bmesh.from_edit_mesh(mesh)
+    return np.array([vertex.co for vertex in edit.verts], np.float32).reshape(-1, 3)
+
+
+def write_edit_mesh(mesh: bpy.types.Mesh, points: Points) -> None:
+    """Move the vertices of the edit mesh. Edit Mode only; the same vertex count."""
+    edit = bmesh.from_edit_mesh(mesh)
+    for vertex, point in zip(edit.verts, points.tolist(), strict=True):
+        vertex.co = point
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
+
+
+def write_base(mesh: bpy.types.Mesh, points: Points) -> None:
+    """Write base coordinates through the position attribute. Not in Edit Mode."""
+    flat = np.ascontiguousarray(points, np.float32).ravel()
+    mesh.attributes["position"].data.foreach_set("vector", flat)
+    mesh.update()
+    mesh.update_tag()
+
+
+def edit_vertex_count(mesh: bpy.types.Mesh) -> int:
+    """Vertices of the mesh as edited: of the edit mesh in Edit Mode, else of the mesh."""
+    return len(bmesh.from_edit_mesh(mesh).verts) if mesh.is_editmode else len(mesh.vertices)
+
+
+def topology(mesh: bpy.types.Mesh) -> tuple[int, int, int]:
+    """Number of vertices, faces and face corners. Not in Edit Mode."""
+    return len(mesh.vertices), len(mesh.polygons), len(mesh.loops)
+
+
+def read_faces(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Polygons as (corner vertex indices `#corners`, face sizes `#F`)."""
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    sizes = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_total", sizes)
+    return corners, sizes
+
+
+def new_mesh(name: str, points: Points, faces: tuple[NDArray[np.int32], NDArray[np.int32]]) -> bpy.types.Mesh:
+    """A new mesh datablock from `#V by 3` points and (corners, sizes) faces, corners kept in order."""
+    corners, sizes = faces
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(points))
+    mesh.loops.add(len(corners))
+    mesh.polygons.add(len(sizes))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(points, np.float32).ravel())
+    mesh.loops.foreach_set("vertex_index", corners)
+    mesh.polygons.foreach_set("loop_start", (np.cumsum(sizes) - sizes).astype(np.int32))
+    mesh.update(calc_edges=True)
+    return mesh
+
+
+def apply_matrix(matrix: NDArray[np.float64], points: NDArray[np.floating]) -> Points:
+    """`#V by 3` points through an affine 4 by 4 matrix that acts on columns."""
+    linear = np.asarray(matrix[:3, :3], np.float32).T
+    return np.asarray(points, np.float32) @ linear + np.asarray(matrix[:3, 3], np.float32)

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin weights from vertex groups."""
+
+from __future__ import annotations
+
+import itertools
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .snapshot import Csr
+
+
+def read_weights(obj: bpy.types.Object, bone_index: dict[str, int]) -> Csr:
+    """Weights of the groups named as deforming bones, as CSR (indptr `#V + 1`, bone indices, values > 0).
+
+    Blender has no bulk access to vertex groups, so this walks the vertices; it runs at bind only.
+    Not normalised. Not in Edit Mode.
+    """
+    joint_of = np.array([bone_index.get(group.name, -1) for group in obj.vertex_groups] + [-1], np.int64)
+    per_vertex = [[(g.group, g.weight) for g in vertex.groups] for vertex in obj.data.vertices]
+    counts = np.array([len(groups) for groups in per_vertex], np.int64)
+    flat = np.array(list(itertools.chain.from_iterable(per_vertex)), np.float64).reshape(-1, 2)
+    row = np.repeat(np.arange(len(counts)), counts)
+    group = np.clip(flat[:, 0].astype(np.int64), 0, len(joint_of) - 1)
+    joints = joint_of[group]
+    keep = (joints >= 0) & (flat[:, 1] > 0.0)
+    row, joints, values = row[keep], joints[keep], flat[keep, 1]
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(counts)))]).astype(np.int64)
+    return indptr, joints, values
+
+
+def read_group(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
+    """Weights of one vertex group, `#V`; zero where a vertex is not in it or the group is gone."""
+    weights = np.zeros(len(obj.data.vertices), np.float32)
+    group = obj.vertex_groups.get(name)
+    if group is not None:
+        weights[:] = [next((g.weight for g in v.groups if g.group == group.index), 0.0) for v in obj.data.vertices]
+    return weights

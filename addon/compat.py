@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The one place that knows how Blender 4.2 to 5.2 differ."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+
+def set_modifier_input(modifier: bpy.types.NodesModifier, identifier: str, value: Any) -> None:
+    """Set a Geometry Nodes input: an ID property up to 5.1, an RNA property from 5.2."""
+    inputs = getattr(getattr(modifier, "properties", None), "inputs", None)
+    if inputs is not None:
+        getattr(inputs, identifier).value = value
+    else:
+        modifier[identifier] = value
+
+
+def modifier_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
+    """Read a Geometry Nodes input; None where it is not set."""
+    inputs = getattr(getattr(modifier, "properties", None), "inputs", None)
+    if inputs is not None:
+        found = getattr(inputs, identifier, None)
+        return None if found is None else found.value
+    return modifier.get(identifier)

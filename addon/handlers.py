@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When Blender calls us. Each handler is a door to `sync` and nothing more."""
+
+from __future__ import annotations
+
+import atexit
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import sync
+
+
+@persistent
+def depsgraph_update_post(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    sync.edited(depsgraph)
+
+
+@persistent
+def frame_change_post(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    sync.frame_changed(depsgraph)
+
+
+@persistent
+def undo_post(*_: object) -> None:
+    sync.restored()
+
+
+@persistent
+def redo_post(*_: object) -> None:
+    sync.restored()
+
+
+@persistent
+def load_post(*_: object) -> None:
+    sync.forget()
+    sync.restored()
+
+
+HANDLERS = (depsgraph_update_post, frame_change_post, undo_post, redo_post, load_post)
+
+
+def register() -> None:
+    for handler in HANDLERS:
+        getattr(bpy.app.handlers, handler.__name__).append(handler)
+    # The bpy module of 4.2 and 4.5 hangs or crashes at exit where a handler is still installed.
+    atexit.register(_remove)
+
+
+def unregister() -> None:
+    atexit.unregister(_remove)
+    _remove()
+    sync.forget()
+
+
+def _remove() -> None:
+    for handler in HANDLERS:
+        installed = getattr(bpy.app.handlers, handler.__name__)
+        if handler in installed:
+            installed.remove(handler)

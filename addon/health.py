@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a rig can run: each question answers with a sentence for the artist, or nothing.
+
+A rig that can't run is paused: its skins go back to their own Armature modifiers until it can.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from .adapters import armature, modifier, positions
+
+
+def problem(cage: bpy.types.Object) -> str:
+    """Why the rig can't run and what to do, or an empty string."""
+    settings = cage.cage_rig
+    if settings.version > 1:
+        return f"'{cage.name}' was bound with a newer Cage Rig; update the extension"
+    posed = settings.posed_cage
+    if posed is not None and posed.cage_rig.owner != cage:
+        return f"'{cage.name}' is a copy of cage '{_name(posed.cage_rig.owner)}'; bind it to skins and bones of its own"
+    return _armature_problem(cage) or _cage_problem(cage) or _skins_problem(cage)
+
+
+def live_skins(cage: bpy.types.Object) -> list[tuple[int, bpy.types.Object]]:
+    """Skins that still are in the file's scenes, with their index in the rig."""
+    return [(k, skin.object) for k, skin in enumerate(cage.cage_rig.skins) if _in_use(skin.object)]
+
+
+def lost_skins(cage: bpy.types.Object) -> int:
+    """How many skins of the rig were deleted."""
+    return len(cage.cage_rig.skins) - len(live_skins(cage))
+
+
+def _in_use(obj: bpy.types.Object | None) -> bool:
+    return obj is not None and len(obj.users_collection) > 0
+
+
+def _name(obj: bpy.types.ID | None) -> str:
+    return obj.name if obj is not None else "deleted"
+
+
+def _armature_problem(cage: bpy.types.Object) -> str:
+    obj = cage.cage_rig.armature
+    if obj is None or obj.type != "ARMATURE" or not _in_use(obj):
+        return f"The armature of '{cage.name}' was deleted; undo, or select a new one with the skins and bind again"
+    if obj.mode == "EDIT":
+        return ""
+    missing = follow_renames(cage)
+    if missing:
+        return f"Bone '{missing}' of '{obj.name}' was deleted; undo, or press Rebind"
+    return ""
+
+
+def _cage_problem(cage: bpy.types.Object) -> str:
+    settings = cage.cage_rig
+    if not _in_use(cage):
+        return f"Cage '{cage.name}' was deleted; undo, or link it into a collection again"
+    if settings.snapshot is None:
+        return f"What was bound of '{cage.name}' is lost; press Rebind"
+    if settings.posed_cage is None or not _in_use(settings.posed_cage):
+        return f"The posed cage of '{cage.name}' was deleted; undo, or press Rebind to make a new one"
+    for obj in (cage, settings.posed_cage):
+        if obj.data.is_editmode:
+            count, bound = positions.edit_vertex_count(obj.data), len(settings.snapshot.vertices)
+        else:
+            count, bound = positions.topology(obj.data), positions.topology(settings.snapshot)
+        if count != bound:
+            return f"'{obj.name}' has other vertices or faces than when it was bound; undo, or press Rebind"
+    return ""
+
+
+def _skins_problem(cage: bpy.types.Object) -> str:
+    skins = live_skins(cage)
+    if not skins:
+        return f"All skins of '{cage.name}' were deleted; undo, or press Unbind"
+    for index, obj in skins:
+        snapshot = cage.cage_rig.skins[index].snapshot
+        if snapshot is None:
+            return f"What was bound of '{obj.name}' is lost; press Rebind"
+        if len(obj.data.vertices) != len(snapshot.vertices):
+            return (
+                f"'{obj.name}' has {len(obj.data.vertices)} vertices, it had {len(snapshot.vertices)} "
+                "when it was bound; undo, or press Rebind"
+            )
+        ours = modifier.find(obj)
+        if ours is None:
+            return f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind"
+        if modifier.input_object(ours, "Rest Cage") != cage:
+            return f"'{obj.name}' follows another cage; press Rebind to take it back"
+        blocking = modifier.changes_count_before(obj, list(obj.modifiers).index(ours))
+        if blocking:
+            return f"Modifier '{blocking}' of '{obj.name}' changes the vertices before Cage Rig; move it after"
+    return ""
+
+
+def follow_renames(cage: bpy.types.Object) -> str:
+    """Take over new names of bones, recognised by their rest position; returns the name of a bone that is gone."""
+    joints, bones = cage.cage_rig.joints, cage.cage_rig.armature.data.bones
+    known = {joint.name for joint in joints}
+    lost = [joint for joint in joints if joint.name not in bones]
+    if not lost:
+        return ""
+    fresh = [bone for bone in bones if bone.name not in known]
+    for joint in lost:
+        ends = np.array([*joint.head, *joint.tail])
+        same = [bone for bone in fresh if np.allclose([*bone.head_local, *bone.tail_local], ends, atol=1e-5)]
+        if len(same) != 1:
+            return joint.name
+        joint.name = same[0].name
+    return ""
+
+
+def bone_order(cage: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of the rig's joints among `armature.bones` and among `pose.bones`, each `#J`."""
+    obj = cage.cage_rig.armature
+    rest = {name: k for k, name in enumerate(armature.bone_names(obj.data))}
+    pose = {bone.name: k for k, bone in enumerate(obj.pose.bones)}
+    names = [joint.name for joint in cage.cage_rig.joints]
+    return np.array([rest[name] for name in names]), np.array([pose[name] for name in names])

@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bind, rebind and unbind: everything is read and computed first, and only then is anything written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from . import props, sync
+from .adapters import armature, modifier, positions, snapshot, vertex_groups
+from .session import Session, SessionError, SkinSnapshot, Snapshot
+
+Matrix = NDArray[np.float64]
+
+
+class BindError(Exception):
+    """The selection can't be bound; the message is a sentence for the artist. Nothing was changed."""
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """What a bind has read: the core's snapshot, and what only Blender needs of it."""
+
+    snapshot: Snapshot
+    bone_names: list[str]
+    skin_to_rig: list[Matrix]
+    cage_to_rig: Matrix
+
+
+def bind(
+    context: bpy.types.Context,
+    cage: bpy.types.Object,
+    armature_object: bpy.types.Object,
+    skins: list[bpy.types.Object],
+) -> None:
+    """Bind skins, armature and cage into a rig that is live from now on. Object Mode.
+
+    Raises `BindError`, with nothing changed, where that can't be.
+    """
+    for obj in (cage, *skins):
+        _refuse_taken(obj)
+    bound = _read(context, cage, armature_object, skins)
+    _compute(cage, bound)
+    settings = cage.cage_rig
+    settings.version, settings.armature = props.VERSION, armature_object
+    for obj in skins:
+        settings.skins.add().object = obj
+    try:
+        _install(context, cage, bound)
+    except Exception:
+        unbind(cage)
+        raise
+
+
+def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> None:
+    """Take the present meshes, weights and rest bones as the new rest; keep keys and settings. Object Mode.
+
+    Skins that were deleted are forgotten. Raises `BindError`, with nothing changed, where it can't be.
+    """
+    settings = cage.cage_rig
+    if settings.armature is None or not settings.armature.users_collection:
+        raise BindError(f"The armature of '{cage.name}' was deleted; undo, or Unbind and bind with another")
+    if settings.posed_cage is not None and settings.posed_cage.cage_rig.owner != cage:
+        raise BindError(f"'{cage.name}' is a copy of another rig's cage; Unbind it, then bind it")
+    skins = [skin.object for skin in settings.skins if skin.object is not None and skin.object.users_collection]
+    if not skins:
+        raise BindError(f"All skins of '{cage.name}' were deleted; undo, or Unbind")
+    bound = _read(context, cage, settings.armature, skins)
+    _compute(cage, bound)
+    for index in reversed(range(len(settings.skins))):
+        if settings.skins[index].object not in skins:
+            _remove_mesh(settings.skins[index].snapshot)
+            settings.skins.remove(index)
+    _install(context, cage, bound)
+
+
+def unbind(cage: bpy.types.Object) -> None:
+    """Put everything back as it was before the bind and forget the rig."""
+    settings = cage.cage_rig
+    sync.drop(cage)
+    owned = settings.posed_cage is None or settings.posed_cage.cage_rig.owner == cage
+    for skin in settings.skins:
+        if owned and skin.object is not None:
+            modifier.release(skin.object)
+        if owned:
+            _remove_mesh(skin.snapshot)
+    if owned:
+        modifier.restore_suspended(cage)
+        _remove_mesh(settings.snapshot)
+        for obj in (settings.posed_cage, settings.refit_armature):
+            _remove_object(obj)
+    cage.property_unset("cage_rig")
+    sync.drop(cage)
+
+
+def summary(cage: bpy.types.Object) -> str:
+    """One sentence on what was bound, and what the bind found that the artist should know."""
+    settings, report = cage.cage_rig, sync.report(cage)
+    if settings.state == "PAUSED":
+        return settings.message
+    vertices = sum(len(skin.snapshot.vertices) for skin in settings.skins)
+    text = (
+        f"Bound '{cage.name}' ({len(settings.snapshot.vertices)} vertices) to {len(settings.skins)} skin(s) "
+        f"({vertices} vertices) and {len(settings.joints)} bones"
+    )
+    outside = [settings.joints[k].name for k in report.get("joints_outside_hull", [])]
+    if outside:
+        named = ", ".join(f"'{name}'" for name in outside[:3]) + (" and others" if len(outside) > 3 else "")
+        text += f". Outside the cage: {named}"
+    return text
+
+
+def _refuse_taken(obj: bpy.types.Object) -> None:
+    settings = obj.cage_rig
+    if settings.state != "NONE":
+        owner = settings.posed_cage.cage_rig.owner if settings.posed_cage else obj
+        if owner not in (None, obj):
+            unbind(obj)  # a copy of a bound cage: it may start anew
+            return
+        raise BindError(f"'{obj.name}' is the cage of a rig already; press Rebind, or Unbind it first")
+    if settings.part != "NONE" and settings.owner is not None:
+        raise BindError(f"'{obj.name}' belongs to the rig of cage '{settings.owner.name}'; Unbind that first")
+    if obj.library is not None or obj.data.library is not None:
+        raise BindError(f"'{obj.name}' is linked from another file; make it local first")
+
+
+def _read(
+    context: bpy.types.Context,
+    cage: bpy.types.Object,
+    armature_object: bpy.types.Object,
+    skins: list[bpy.types.Object],
+) -> _Bound:
+    rest = armature.read_rest(armature_object.data)
+    if not rest.names:
+        raise BindError(f"Armature '{armature_object.name}' has no bones")
+    deforming = {name: k for k, name in enumerate(rest.names) if rest.deform[k]}
+    with _at_rest(context, armature_object):
+        world = armature.to_array(armature_object.matrix_world)
+        to_rig = [_to_rig(obj, world, armature_object.name) for obj in (*skins, cage)]
+    parts = [_read_skin(obj, deforming, matrix) for obj, matrix in zip(skins, to_rig, strict=False)]
+    _refuse_bendy(armature_object, rest, parts)
+    for obj in skins:
+        blocking = modifier.changes_count_before(obj, modifier.place(obj, armature_object))
+        if blocking:
+            raise BindError(
+                f"Modifier '{blocking}' of '{obj.name}' changes the vertices before the Armature modifier; "
+                "apply it or move it after"
+            )
+    cage_points = positions.apply_matrix(to_rig[-1], positions.read_base(cage.data))
+    core = Snapshot(
+        parts,
+        rest.heads.astype(np.float32).astype(np.float64),
+        rest.tails.astype(np.float32).astype(np.float64),
+        rest.parents,
+        cage_points,
+        positions.read_faces(cage.data),
+        cage.cage_rig.method.lower(),
+    )
+    return _Bound(core, rest.names, to_rig[:-1], to_rig[-1])
+
+
+def _to_rig(obj: bpy.types.Object, armature_world: Matrix, armature_name: str) -> Matrix:
+    if abs(np.linalg.det(armature_world[:3, :3])) < 1e-12:
+        raise BindError(f"Armature '{armature_name}' is scaled to nothing; give it a scale")
+    world = armature.to_array(obj.matrix_world)
+    if abs(np.linalg.det(world[:3, :3])) < 1e-12:
+        raise BindError(f"'{obj.name}' is scaled to nothing; give it a scale")
+    # through float32: what a file keeps
+    return (np.linalg.inv(armature_world) @ world).astype(np.float32).astype(np.float64)
+
+
+def _read_skin(obj: bpy.types.Object, deforming: dict[str, int], to_rig: Matrix) -> SkinSnapshot:
+    mesh = obj.data
+    if mesh.users - mesh.use_fake_user > 1:
+        raise BindError(f"The mesh of '{obj.name}' is shared with another object; make it single-user first")
+    if not mesh.polygons:
+        raise BindError(f"'{obj.name}' has no faces, so it can't be a skin")
+    indptr, joints, values = vertex_groups.read_weights(obj, deforming)
+    if not len(joints):
+        raise BindError(
+            f"'{obj.name}' has no weights: none of its vertex groups is named as a deforming bone; "
+            "parent it to the armature with automatic weights, or paint some"
+        )
+    values = values.astype(np.float32).astype(np.float64)
+    points = positions.apply_matrix(to_rig, positions.read_base(mesh))
+    return SkinSnapshot(points, positions.read_faces(mesh), (indptr, joints, values))
+
+
+def _refuse_bendy(obj: bpy.types.Object, rest: armature.RestBones, skins: list[SkinSnapshot]) -> None:
+    used = np.unique(np.concatenate([skin.weights[1] for skin in skins]))
+    bendy = used[rest.segments[used] > 1]
+    if len(bendy):
+        raise BindError(
+            f"Bone '{rest.names[bendy[0]]}' of '{obj.name}' is a B-bone and deforms the skin; "
+            "set its segments to 1 (Bone properties, Bendy Bones)"
+        )
+
+
+def _compute(cage: bpy.types.Object, bound: _Bound) -> None:
+    """Let the core bind: what it refuses is refused before anything is written."""
+    try:
+        Session(bound.snapshot)
+    except SessionError as error:
+        raise BindError(f"'{cage.name}' can't be bound: {error}") from error
+
+
+def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound) -> None:
+    settings = cage.cage_rig
+    sync.drop(cage)
+    _write_joints(cage, bound)
+    settings.cage_to_rig = bound.cage_to_rig.T.tolist()
+    _remove_mesh(settings.snapshot)
+    settings.snapshot = snapshot.write(f"{cage.name} Bind", bound.snapshot.cage, bound.snapshot.cage_faces, None)
+    _make_posed_cage(context, cage, bound)
+    _make_refit_armature(context, cage)
+    modifier.suspend_armature(cage, settings.armature)
+    for index, skin in enumerate(settings.skins):
+        part = bound.snapshot.skins[index]
+        _remove_mesh(skin.snapshot)
+        skin.snapshot = snapshot.write(f"{skin.object.name} Bind", part.points, part.faces, part.weights)
+        skin.skin_to_rig = bound.skin_to_rig[index].T.tolist()
+        _join(skin.object, cage)
+    settings.state, settings.message = "LIVE", ""
+    sync.start(cage, context.evaluated_depsgraph_get())
+
+
+def _join(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
+    settings = cage.cage_rig
+    skin.cage_rig.part, skin.cage_rig.owner = "SKIN", cage
+    ours = modifier.find(skin)
+    if ours is None:
+        modifier.add(skin, cage, settings.posed_cage, modifier.place(skin, settings.armature))
+    else:
+        modifier.connect(ours, cage, settings.posed_cage)
+    modifier.suspend_armature(skin, settings.armature)
+
+
+def _write_joints(cage: bpy.types.Object, bound: _Bound) -> None:
+    joints = cage.cage_rig.joints
+    joints.clear()
+    for k, name in enumerate(bound.bone_names):
+        joint = joints.add()
+        joint.name, joint.parent = name, int(bound.snapshot.parents[k])
+        joint.head, joint.tail = bound.snapshot.heads[k], bound.snapshot.tails[k]
+
+
+def _make_posed_cage(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound) -> None:
+    """The posed cage: a mesh of the cage's faces in rig space, parented to the armature.
+
+    Its Armature constraint has no influence: it makes Blender evaluate every bone for the skins, which take the
+    posed cage as an input, even where the armature is hidden.
+    """
+    settings = cage.cage_rig
+    mesh = positions.new_mesh(f"{cage.name} Posed", bound.snapshot.cage, bound.snapshot.cage_faces)
+    obj = settings.posed_cage
+    if obj is None:
+        obj = bpy.data.objects.new(mesh.name, mesh)
+        obj.display_type, obj.show_in_front, obj.hide_render = "WIRE", True, True
+        settings.posed_cage = obj
+    else:
+        old, obj.data = obj.data, mesh
+        mesh.name = old.name
+        _remove_mesh(old)
+    _attach(context, obj, cage, "POSED_CAGE")
+    for constraint in list(obj.constraints):
+        obj.constraints.remove(constraint)
+    constraint = obj.constraints.new("ARMATURE")
+    constraint.name, constraint.influence = "Cage Rig: evaluate every bone", 0.0
+    for name in bound.bone_names:
+        target = constraint.targets.new()
+        target.target, target.subtarget = settings.armature, name
+
+
+def _make_refit_armature(context: bpy.types.Context, cage: bpy.types.Object) -> None:
+    settings = cage.cage_rig
+    _remove_object(settings.refit_armature)
+    data = armature.new_refit_armature(f"{cage.name} Refit", settings.armature.data)
+    obj = bpy.data.objects.new(data.name, data)
+    obj.show_in_front, obj.hide_render = True, True
+    settings.refit_armature = obj
+    _attach(context, obj, cage, "REFIT_ARMATURE")
+    armature.free_bones(obj, context)
+
+
+def _attach(context: bpy.types.Context, obj: bpy.types.Object, cage: bpy.types.Object, part: str) -> None:
+    obj.cage_rig.part, obj.cage_rig.owner = part, cage
+    obj.parent = cage.cage_rig.armature
+    obj.matrix_parent_inverse.identity()
+    obj.matrix_basis.identity()
+    if not obj.users_collection:
+        collections = cage.users_collection or (context.scene.collection,)
+        collections[0].objects.link(obj)
+
+
+@contextmanager
+def _at_rest(context: bpy.types.Context, armature_object: bpy.types.Object) -> Iterator[None]:
+    """The armature in rest position, so that what hangs on its bones is where it was made."""
+    data = armature_object.data
+    before = data.pose_position
+    if before == "REST":
+        yield
+        return
+    data.pose_position = "REST"
+    context.view_layer.update()
+    try:
+        yield
+    finally:
+        data.pose_position = before
+        context.view_layer.update()
+
+
+def _remove_mesh(mesh: bpy.types.Mesh | None) -> None:
+    if mesh is not None:
+        bpy.data.meshes.remove(mesh)
+
+
+def _remove_object(obj: bpy.types.Object | None) -> None:
+    if obj is None:
+        return
+    data = obj.data
+    bpy.data.objects.remove(obj)
+    if data.users == 0:
+        bpy.data.batch_remove([data])

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist can do, one operator a file."""
+
+from __future__ import annotations
+
+import bpy
+
+from .bind import CAGE_RIG_OT_bind
+from .rebind import CAGE_RIG_OT_rebind
+from .select_part import CAGE_RIG_OT_select_part
+from .unbind import CAGE_RIG_OT_unbind
+
+CLASSES = (CAGE_RIG_OT_bind, CAGE_RIG_OT_rebind, CAGE_RIG_OT_unbind, CAGE_RIG_OT_select_part)
+
+
+def _object_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator(CAGE_RIG_OT_bind.bl_idname)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.VIEW3D_MT_object.append(_object_menu)
+
+
+def unregister() -> None:
+    bpy.types.VIEW3D_MT_object.remove(_object_menu)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

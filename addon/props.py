@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rig's settings, kept in the .blend on the rest cage object: `cage_object.cage_rig`.
+
+Everything here is data that a file needs to open with its rigs live. Nothing is computed here.
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+VERSION = 1
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
+
+# Numbers never move: they are what files store.
+METHODS = [
+    ("LBS", "Linear", "Linear blend skinning: what Blender's Armature modifier does by default", 0),
+]
+STATES = [
+    ("NONE", "Not Bound", "This object is not the cage of a rig", 0),
+    ("LIVE", "Live", "Cage, armature and skins follow one another", 1),
+    ("PAUSED", "Paused", "The rig can't run; the message says why and what to do", 2),
+]
+PARTS = [
+    ("NONE", "None", "Not part of a rig", 0),
+    ("POSED_CAGE", "Posed Cage", "The cage as the pose deforms it", 1),
+    ("REFIT_ARMATURE", "Refit Armature", "The bones, refit to the edited cage", 2),
+    ("SKIN", "Skin", "A mesh that a rig deforms", 3),
+]
+
+
+class CageRigJoint(bpy.types.PropertyGroup):
+    """One bone of the armature as it was at bind. `name` is the bone's name (inherited)."""
+
+    name: StringProperty(name="Bone", override=OVERRIDABLE)
+    parent: IntProperty(name="Parent", default=-1, override=OVERRIDABLE)
+    head: FloatVectorProperty(name="Head", description="Rest position in the armature's space", override=OVERRIDABLE)
+    tail: FloatVectorProperty(name="Tail", description="Rest tail in the armature's space", override=OVERRIDABLE)
+
+
+class CageRigSuspended(bpy.types.PropertyGroup):
+    """A modifier that Cage Rig switched off, and how it was. `name` is the modifier's name."""
+
+    name: StringProperty(name="Modifier", override=OVERRIDABLE)
+    show_viewport: BoolProperty(override=OVERRIDABLE)
+    show_render: BoolProperty(override=OVERRIDABLE)
+
+
+class CageRigSkin(bpy.types.PropertyGroup):
+    """One skin mesh of the rig, with its bind snapshot."""
+
+    object: PointerProperty(type=bpy.types.Object, name="Skin", override=OVERRIDABLE)
+    snapshot: PointerProperty(type=bpy.types.Mesh, name="Snapshot", override=OVERRIDABLE)
+    skin_to_rig: FloatVectorProperty(name="Skin to Rig", subtype="MATRIX", size=(4, 4), override=OVERRIDABLE)
+
+
+class CageRigSettings(bpy.types.PropertyGroup):
+    """Settings of the rig whose rest cage this object is, and marks on the objects that belong to a rig."""
+
+    version: IntProperty(default=0, override=OVERRIDABLE)
+    state: EnumProperty(items=STATES, name="State", default="NONE", override=OVERRIDABLE)
+    message: StringProperty(name="Message", override=OVERRIDABLE)
+    method: EnumProperty(
+        items=METHODS, name="Method", description="How bones deform the skin", default="LBS", override=OVERRIDABLE
+    )
+    influence: FloatProperty(
+        name="Influence",
+        description="How much of the cage's shape reaches the skin and the joints: 0 is the cage as it was bound",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options={"ANIMATABLE", "LIBRARY_EDITABLE"},
+        override=OVERRIDABLE,
+    )
+    armature: PointerProperty(type=bpy.types.Object, name="Armature", override=OVERRIDABLE)
+    posed_cage: PointerProperty(type=bpy.types.Object, name="Posed Cage", override=OVERRIDABLE)
+    refit_armature: PointerProperty(type=bpy.types.Object, name="Refit Armature", override=OVERRIDABLE)
+    skins: CollectionProperty(type=CageRigSkin, name="Skins", override=OVERRIDABLE | {"USE_INSERTION"})
+    joints: CollectionProperty(type=CageRigJoint, name="Joints", override=OVERRIDABLE | {"USE_INSERTION"})
+    snapshot: PointerProperty(type=bpy.types.Mesh, name="Cage at Bind", override=OVERRIDABLE)
+    cage_to_rig: FloatVectorProperty(name="Cage to Rig", subtype="MATRIX", size=(4, 4), override=OVERRIDABLE)
+
+    # Marks on participants. `owner` is the rest cage they belong to.
+    part: EnumProperty(items=PARTS, default="NONE", override=OVERRIDABLE)
+    owner: PointerProperty(type=bpy.types.Object, name="Owner", override=OVERRIDABLE)
+    suspended: CollectionProperty(type=CageRigSuspended, override=OVERRIDABLE | {"USE_INSERTION"})
+
+
+def rig_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
+    """The rest cage of the rig that `obj` is part of: cage, skin, posed cage, refit bones or armature."""
+    if obj is None:
+        return None
+    if obj.cage_rig.state != "NONE":
+        return obj
+    if obj.cage_rig.owner is None and obj.type == "ARMATURE":
+        return next((child.cage_rig.owner for child in obj.children if child.cage_rig.owner), None)
+    return obj.cage_rig.owner
+
+
+CLASSES = (CageRigJoint, CageRigSuspended, CageRigSkin, CageRigSettings)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.cage_rig = PointerProperty(type=CageRigSettings, name="Cage Rig", override=OVERRIDABLE)
+
+
+def unregister() -> None:
+    del bpy.types.Object.cage_rig
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which rigs a file has and which of them an update touches: names and session uids, never objects.
+
+The lists are a cache of what the .blend says. They are forgotten whenever objects may have come or gone, and read
+again on the next question.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+
+from .adapters import modifier
+
+
+@dataclass
+class _Found:
+    count: int = -1  # objects in the file when it was looked through
+    names: list[str] = field(default_factory=list)
+    participants: dict[int, set[str]] = field(default_factory=dict)  # session uid -> names of rest cages
+
+
+_found = _Found()
+
+
+def forget() -> None:
+    """Look through the file again at the next question."""
+    _found.count = -1
+
+
+def rigs() -> list[bpy.types.Object]:
+    """The rest cage objects of all rigs in the file."""
+    if _found.count != len(bpy.data.objects):
+        _look()
+    cages = [bpy.data.objects.get(name) for name in _found.names]
+    if any(cage is None or not is_rig(cage) for cage in cages):  # renamed or gone
+        _look()
+        cages = [bpy.data.objects[name] for name in _found.names]
+    return cages
+
+
+def is_rig(obj: bpy.types.Object) -> bool:
+    """Whether the object is the rest cage of a rig."""
+    return obj.cage_rig.state != "NONE"
+
+
+def touched(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
+    """The rigs of which a participant is among the updates of `depsgraph`."""
+    cages = rigs()
+    if not cages:
+        return []
+    names: set[str] = set()
+    for update in depsgraph.updates:
+        original = update.id.original
+        names |= _found.participants.get(original.session_uid, set())
+    return [cage for cage in cages if cage.name in names]
+
+
+def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
+    """Every datablock whose change can matter to the rig."""
+    settings = cage.cage_rig
+    objects = [cage, settings.armature, settings.posed_cage, *(skin.object for skin in settings.skins)]
+    found: list[bpy.types.ID] = []
+    for obj in objects:
+        if obj is None:
+            continue
+        found += [obj, obj.data]
+        keys = getattr(obj.data, "shape_keys", None)
+        if keys is not None:
+            found.append(keys)
+    return found
+
+
+def _look() -> None:
+    _found.count = len(bpy.data.objects)
+    cages = [obj for obj in bpy.data.objects if is_rig(obj)]
+    _found.names = [cage.name for cage in cages]
+    _found.participants = {}
+    _release_strays()
+    for cage in cages:
+        for datablock in participants(cage):
+            _found.participants.setdefault(datablock.session_uid, set()).add(cage.name)
+
+
+def _release_strays() -> None:
+    """Skins whose rig is gone, and copies of skins that no rig lists, go back to plain Blender skinning."""
+    for obj in bpy.data.objects:
+        mark = obj.cage_rig
+        if mark.part == "SKIN" and not (mark.owner and any(skin.object == obj for skin in mark.owner.cage_rig.skins)):
+            modifier.release(obj)

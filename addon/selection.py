@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist has selected, in the rig's terms."""
+
+from __future__ import annotations
+
+import bpy
+from mathutils import Vector
+
+from .lifecycle import BindError
+from .props import rig_of
+
+
+def poll_rig(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Poll of operators that work on the active object's rig in Object Mode."""
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Only in Object Mode")
+        return False
+    if rig_of(context.object) is None:
+        operator.poll_message_set("Select the cage, a skin or the armature of a rig")
+        return False
+    return True
+
+
+def to_bind(
+    context: bpy.types.Context,
+) -> tuple[bpy.types.Object, bpy.types.Object, list[bpy.types.Object]]:
+    """Cage, armature and skins from the selection. Raises `BindError` with what is missing."""
+    selected = context.selected_objects
+    armatures = [obj for obj in selected if obj.type == "ARMATURE"]
+    meshes = [obj for obj in selected if obj.type == "MESH"]
+    if len(armatures) != 1:
+        raise BindError(f"Select one armature with the skins and the cage; {len(armatures)} are selected")
+    if len(meshes) < 2:
+        raise BindError(f"Select the skin meshes and the cage with the armature; {len(meshes)} mesh is selected")
+    cage = _cage_among(meshes, context.view_layer.objects.active)
+    return cage, armatures[0], [obj for obj in meshes if obj != cage]
+
+
+def _cage_among(meshes: list[bpy.types.Object], active: bpy.types.Object | None) -> bpy.types.Object:
+    enclosing = [obj for obj in meshes if all(other == obj or _encloses(obj, other) for other in meshes)]
+    if len(enclosing) == 1:
+        return enclosing[0]
+    if active in meshes:
+        return active
+    raise BindError("No selected mesh encloses the others; make the cage the active object")
+
+
+def _encloses(outer: bpy.types.Object, inner: bpy.types.Object) -> bool:
+    """Whether the box of one object contains that of the other, in world space."""
+    low, high = _box(outer)
+    inner_low, inner_high = _box(inner)
+    return all(low[k] <= inner_low[k] and inner_high[k] <= high[k] for k in range(3))
+
+
+def _box(obj: bpy.types.Object) -> tuple[Vector, Vector]:
+    corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+    return Vector(map(min, zip(*corners, strict=True))), Vector(map(max, zip(*corners, strict=True)))

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays in, arrays out: one bound rig as the core computes it. Knows no bpy.
+
+A session is made from a bind snapshot alone and can be thrown away at any moment: the .blend is the truth.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ParamSpec, TypeVar
+
+import cage_rig_core
+import numpy as np
+from numpy.typing import NDArray
+
+P = ParamSpec("P")
+R = TypeVar("R")
+Points = NDArray[np.float32]
+Matrices = NDArray[np.float64]
+
+
+class SessionError(Exception):
+    """The core refused an input; the message is its sentence. The session is as it was."""
+
+
+class SessionCrash(SessionError):
+    """The core failed in a way that is a bug; the session must be dropped."""
+
+
+def _door(function: Callable[P, R]) -> Callable[P, R]:
+    """The one place where errors of the core become ours. A Rust panic is a BaseException and stops here too."""
+
+    @functools.wraps(function)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return function(*args, **kwargs)
+        except ValueError as error:
+            raise SessionError(str(error)) from error
+        except cage_rig_core.PanicException as panic:
+            raise SessionCrash(f"internal error of the core ({panic}); please report it") from None
+
+    return guarded
+
+
+@dataclass(frozen=True)
+class SkinSnapshot:
+    """One skin as bound: `#M by 3` rest points in rig space, (corners, sizes) faces, CSR weights."""
+
+    points: Points
+    faces: tuple[NDArray[np.int32], NDArray[np.int32]]
+    weights: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything a rig is computed from, in rig space."""
+
+    skins: list[SkinSnapshot]
+    heads: Matrices  # #J by 3 rest joints
+    tails: Matrices  # #J by 3
+    parents: NDArray[np.int32]  # #J, -1 at roots
+    cage: Points  # #C by 3
+    cage_faces: tuple[NDArray[np.int32], NDArray[np.int32]]
+    method: str
+
+
+class Session:
+    """One bound rig. `play`, `edit_posed_cage` and the results mirror the core's edits and structures."""
+
+    @_door
+    def __init__(self, snapshot: Snapshot) -> None:
+        self.snapshot = snapshot
+        skins = snapshot.skins
+        counts = [len(skin.points) for skin in skins]
+        self.starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
+        self.rig = cage_rig_core.CoupledRig(
+            np.concatenate([skin.points for skin in skins]),
+            _join_faces(skins, self.starts),
+            _join_weights(skins),
+            snapshot.heads,
+            snapshot.parents,
+            snapshot.cage,
+            snapshot.cage_faces,
+            method=snapshot.method,
+        )
+        self.influence = 1.0
+        self.revision = 0  # grows whenever a result may have changed
+        self._links = _tail_links(snapshot)
+        self._buffers = [np.empty((count, 3), np.float32) for count in counts]
+        self._offsets: list[Points | None] = [None] * len(skins)
+        self._last: tuple[Any, ...] | None = None
+        self._posed_cage: tuple[int, Points] | None = None
+
+    @property
+    def size(self) -> float:
+        """Bounding-box diagonal of the rest skin."""
+        return float(self.rig.size)
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What the bind found; see the core."""
+        return dict(self.rig.report)
+
+    @_door
+    def play(self, cage: Points, transforms: Matrices, rest_joints: Matrices, influence: float = 1.0) -> None:
+        """Set the rest cage (`#C by 3`, rig space) and the animation's transforms (`#J by 4 by 4`) together."""
+        key = (cage.tobytes(), transforms.tobytes(), rest_joints.tobytes(), influence)
+        if key == self._last:
+            return
+        base = self.snapshot.cage.astype(np.float64)
+        shape = cage if influence == 1.0 else base + influence * (cage.astype(np.float64) - base)
+        self.rig.play(shape, transforms, rest_joints)
+        self._last, self.influence = key, influence
+        self.revision += 1
+
+    @_door
+    def edit_posed_cage(self, posed_cage: Points) -> NDArray[np.float64]:
+        """Move the posed cage there; returns the rest cage (`#C by 3`, rig space) that puts it there."""
+        if self.influence < 1e-3:
+            raise SessionError("the rig's influence is 0, so an edit of the posed cage can't show; raise it first")
+        self.rig.edit_posed_cage(posed_cage)
+        self._last = None
+        self.revision += 1
+        base = self.snapshot.cage.astype(np.float64)
+        return base + (self.rig.rest_cage - base) / self.influence
+
+    @_door
+    def offset_skins(self, offsets: list[Points | None]) -> None:
+        """Add rest-pose offsets (`#M by 3`, rig space) to the skins: facial shape keys, skins moved by hand."""
+        if all(_same(new, old) for new, old in zip(offsets, self._offsets, strict=True)):
+            return
+        self._offsets = offsets
+        if all(offset is None for offset in offsets):
+            self.rig.offset_rest_skin(None)
+        else:
+            parts = [
+                np.zeros_like(skin.points) if offset is None else offset
+                for offset, skin in zip(offsets, self.snapshot.skins, strict=True)
+            ]
+            self.rig.offset_rest_skin(np.concatenate(parts))
+        self.revision += 1
+
+    @_door
+    def posed_skin(self, index: int) -> Points:
+        """Deformed points of one skin, `#M by 3` in rig space. The buffer is reused by the next call."""
+        self.rig.posed_skin_into(self._buffers[index], start=int(self.starts[index]))
+        return self._buffers[index]
+
+    @_door
+    def posed_cage(self) -> Points:
+        """The posed cage, `#C by 3` in rig space, as the float32 that Blender keeps."""
+        if self._posed_cage is None or self._posed_cage[0] != self.revision:
+            self._posed_cage = (self.revision, self.rig.posed_cage.astype(np.float32))
+        return self._posed_cage[1]
+
+    @_door
+    def refit_pose(self, rest: Matrices) -> Matrices:
+        """Posed matrices of the refit bones, `#J by 4 by 4`: orientation of the animation, head at the refit joint.
+
+        `rest` are the bones' rest matrices. A bone whose tail was its child's head at bind is stretched along
+        itself to reach the child's refit joint.
+        """
+        joints = self.rig.joints
+        moved = rest.copy()
+        moved[:, :3, 3] = joints
+        if len(self._links):
+            bone, child = self._links.T
+            along = rest[bone, :3, 1]
+            length = np.linalg.norm(self.snapshot.tails[bone] - self.snapshot.heads[bone], axis=1)
+            reach = np.einsum("ij,ij->i", joints[child] - joints[bone], along) / np.maximum(length, 1e-12)
+            moved[bone, :3, 1] *= np.clip(reach, 0.05, None)[:, None]
+        return self.rig.transforms @ moved
+
+
+def _same(new: Points | None, old: Points | None) -> bool:
+    if new is None or old is None:
+        return new is old
+    return np.array_equal(new, old)
+
+
+def _join_faces(skins: list[SkinSnapshot], starts: NDArray[np.int_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    corners = [skin.faces[0].astype(np.int64) + start for skin, start in zip(skins, starts, strict=False)]
+    return np.concatenate(corners), np.concatenate([skin.faces[1].astype(np.int64) for skin in skins])
+
+
+def _join_weights(skins: list[SkinSnapshot]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    counts = np.concatenate([np.diff(skin.weights[0]) for skin in skins])
+    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    return (
+        indptr,
+        np.concatenate([skin.weights[1] for skin in skins]),
+        np.concatenate([skin.weights[2] for skin in skins]),
+    )
+
+
+def _tail_links(snapshot: Snapshot) -> NDArray[np.int64]:
+    """Pairs (bone, child) where the bone's tail is the child's head, `#links by 2`; the first child wins."""
+    links: dict[int, int] = {}
+    lengths = np.linalg.norm(snapshot.tails - snapshot.heads, axis=1)
+    for child, parent in enumerate(snapshot.parents.tolist()):
+        gap = np.linalg.norm(snapshot.heads[child] - snapshot.tails[parent]) if parent >= 0 else np.inf
+        if gap <= 1e-4 * lengths[parent]:
+            links.setdefault(parent, child)
+    return np.array(sorted(links.items()), np.int64).reshape(-1, 2)

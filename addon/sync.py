@@ -1,0 +1,349 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One update of one rig: read Blender, decide which edit it was, ask the session, write back.
+
+The door for handlers and operators. Sessions live here by the session uid of their rest cage and can be dropped at
+any moment; they are rebuilt from the .blend.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from . import health, registry
+from .adapters import armature, modifier, positions, shape_keys, snapshot
+from .session import Session, SessionCrash, SessionError, SkinSnapshot, Snapshot
+
+Points = NDArray[np.float32]
+Matrix = NDArray[np.float64]
+
+
+class Event(enum.Enum):
+    """What made Blender call us."""
+
+    EDIT = enum.auto()  # a change in the viewport: both cages and the bones may be edits
+    FRAME = enum.auto()  # playback, scrubbing, render, export: cage and pose are set together
+    RESTORED = enum.auto()  # undo, redo, load, bind: the data is the truth, whatever we knew
+
+
+@dataclass
+class _Running:
+    """A session, and what of Blender it has seen, so that the next change can be told apart."""
+
+    session: Session
+    cage: Points | None = None  # rest cage, rig space, as last read
+    cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
+    posed: Points | None = None  # posed cage as last read or written
+    refit_rest: Matrix | None = None
+    written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
+
+
+_running: dict[int, _Running] = {}
+_busy = False
+
+
+def forget() -> None:
+    """Drop every session: after loading a file, and when the add-on goes."""
+    _running.clear()
+    registry.forget()
+
+
+def drop(cage: bpy.types.Object) -> None:
+    """Drop one rig's session: its snapshot changed."""
+    _running.pop(cage.session_uid, None)
+    registry.forget()
+
+
+def edited(depsgraph: bpy.types.Depsgraph) -> None:
+    """After an update of the viewport: sync the rigs that it touched."""
+    for cage in registry.touched(depsgraph):
+        update(cage, depsgraph, Event.EDIT)
+
+
+def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
+    """After a frame change, in the viewport's depsgraph or a render's: sync every rig."""
+    for cage in registry.rigs():
+        update(cage, depsgraph, Event.FRAME)
+
+
+def restored() -> None:
+    """After undo, redo or load: read everything again."""
+    registry.forget()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for cage in registry.rigs():
+        update(cage, depsgraph, Event.RESTORED)
+
+
+def start(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """After a bind: compute and show the rig."""
+    drop(cage)
+    update(cage, depsgraph, Event.RESTORED)
+
+
+def report(cage: bpy.types.Object) -> dict[str, object]:
+    """What the bind of a running rig found; empty where it does not run."""
+    running = _running.get(cage.session_uid)
+    return {} if running is None else running.session.report
+
+
+def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
+    """Sync one rig. Never raises: a rig that can't run is paused and says why."""
+    global _busy
+    if _busy:
+        return
+    _busy = True
+    try:
+        _update(cage, depsgraph, event)
+    except SessionError as error:
+        if isinstance(error, SessionCrash):
+            _running.pop(cage.session_uid, None)
+        _pause(cage, f"'{cage.name}': {error}")
+    except Exception as error:  # a handler must never raise, whatever the file holds
+        _pause(cage, f"'{cage.name}' met an error in Cage Rig ({type(error).__name__}: {error}); please report it")
+    finally:
+        _busy = False
+
+
+def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
+    trouble = health.problem(cage)
+    if trouble:
+        _pause(cage, trouble)
+        return
+    source, bones = cage.evaluated_get(depsgraph), cage.cage_rig.armature.evaluated_get(depsgraph)
+    if not (source.is_evaluated and bones.is_evaluated):
+        return  # in no view of this depsgraph: nothing of it is shown
+    running = _running.get(cage.session_uid)
+    if running is None:
+        running = _running[cage.session_uid] = _start(cage)
+        event = Event.RESTORED
+    if event is Event.RESTORED:
+        running.written.clear()
+        running.cage_wanted = None
+    note = _advance(cage, running, depsgraph, event)
+    _write_back(cage, running, depsgraph)
+    _resume(cage, note)
+
+
+def _start(cage: bpy.types.Object) -> _Running:
+    settings = cage.cage_rig
+    skins = [
+        SkinSnapshot(
+            positions.read_base(skin.snapshot),
+            positions.read_faces(skin.snapshot),
+            snapshot.read_weights(skin.snapshot),
+        )
+        for skin in settings.skins
+    ]
+    joints = settings.joints
+    return _Running(
+        Session(
+            Snapshot(
+                skins,
+                np.array([joint.head for joint in joints], np.float64).reshape(-1, 3),
+                np.array([joint.tail for joint in joints], np.float64).reshape(-1, 3),
+                np.array([joint.parent for joint in joints], np.int32),
+                positions.read_base(settings.snapshot),
+                positions.read_faces(settings.snapshot),
+                settings.method.lower(),
+            )
+        )
+    )
+
+
+def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:
+    """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
+    session, settings = running.session, cage.cage_rig
+    session.offset_skins(_skin_offsets(cage, running, depsgraph))
+    transforms, rest_joints = _read_pose(cage, depsgraph)
+    influence = float(cage.evaluated_get(depsgraph).cage_rig.influence)
+    rest = _read_rest_cage(cage, depsgraph)
+    if len(rest) != len(session.snapshot.cage):
+        raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")
+    rest_changed = running.cage is None or not np.array_equal(rest, running.cage)
+    if rest_changed and running.cage_wanted is not None:
+        rest_changed = not np.allclose(rest, running.cage_wanted, rtol=0.0, atol=1e-6 * session.size)
+    posed_object = settings.posed_cage
+    posed = _read_posed_cage(posed_object)
+    posed_changed = running.posed is None or not np.array_equal(posed, running.posed)
+    in_edit_mode = posed_object.data.is_editmode
+    is_edit = posed_changed and (
+        in_edit_mode if event is Event.RESTORED else event is Event.EDIT and not _rest_is_edited(cage, rest_changed)
+    )
+    if running.cage_wanted is not None and not rest_changed:
+        session.play(running.cage_wanted, transforms, rest_joints, influence)
+    else:
+        session.play(rest, transforms, rest_joints, influence)
+        running.cage, running.cage_wanted = rest, None
+    running.posed = posed
+    return _take_posed_edit(cage, running, posed) if is_edit else ""
+
+
+def _rest_is_edited(cage: bpy.types.Object, rest_changed: bool) -> bool:
+    """Whether, with both cages changed, the rest cage is the one in the artist's hands."""
+    return rest_changed and cage.data.is_editmode and bpy.context.view_layer.objects.active == cage
+
+
+def _take_posed_edit(cage: bpy.types.Object, running: _Running, posed: Points) -> str:
+    """The artist moved the posed cage: move the rest cage so that it goes there, or say why that can't be."""
+    try:
+        if not cage.data.is_editmode:
+            shape_keys.key_share(cage)
+            _refuse_deformed_cage(cage)
+        wanted = running.session.edit_posed_cage(posed)
+    except (shape_keys.KeyRefusal, SessionError) as error:
+        if isinstance(error, SessionCrash):
+            raise
+        running.posed = None
+        return str(error)
+    before = running.cage if running.cage_wanted is None else running.cage_wanted
+    _move_rest_cage(cage, before, wanted)
+    running.cage_wanted = wanted.astype(np.float32)
+    return ""
+
+
+def _refuse_deformed_cage(cage: bpy.types.Object) -> None:
+    for mod in cage.modifiers:
+        if mod.show_viewport and mod.name not in cage.cage_rig.suspended:
+            raise shape_keys.KeyRefusal(
+                f"Modifier '{mod.name}' of '{cage.name}' deforms the rest cage, so the posed cage can't be edited; "
+                "switch it off in the viewport or apply it"
+            )
+
+
+def _move_rest_cage(cage: bpy.types.Object, before: Points, wanted: Matrix) -> None:
+    from_rig = np.linalg.inv(_matrix(cage.cage_rig.cage_to_rig))
+    if cage.data.is_editmode:
+        positions.write_edit_mesh(cage.data, positions.apply_matrix(from_rig, wanted))
+    else:
+        delta = (wanted - before) @ from_rig[:3, :3].T
+        shape_keys.move(cage, delta.astype(np.float32))
+
+
+def _read_rest_cage(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points:
+    if cage.data.is_editmode:
+        points = positions.read_edit_mesh(cage.data)
+    else:
+        points = positions.read_evaluated(cage, depsgraph)
+    return positions.apply_matrix(_matrix(cage.cage_rig.cage_to_rig), points)
+
+
+def _read_posed_cage(posed: bpy.types.Object) -> Points:
+    return positions.read_edit_mesh(posed.data) if posed.data.is_editmode else positions.read_base(posed.data)
+
+
+def _read_pose(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, Matrix]:
+    """Transforms T (`#J by 4 by 4`) of the evaluated pose, and the rest joints (`#J by 3`) they are measured at."""
+    obj = cage.cage_rig.armature.evaluated_get(depsgraph)
+    rest_order, pose_order = health.bone_order(cage)
+    rest = armature.read_rest_matrices(obj.data)[rest_order]
+    posed = armature.read_pose_matrices(obj)[pose_order]
+    same = np.isclose(posed, rest, rtol=0.0, atol=1e-7).all(axis=(1, 2))
+    transforms = posed @ np.linalg.inv(rest)
+    transforms[same] = np.eye(4)
+    return transforms, rest[:, :3, 3].copy()
+
+
+def _skin_to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, bool]:
+    """Matrix from skin `index` to the armature's space now, and whether it is still that of the bind."""
+    skin = cage.cage_rig.skins[index]
+    bones = cage.cage_rig.armature.evaluated_get(depsgraph).matrix_world
+    world = skin.object.evaluated_get(depsgraph).matrix_world
+    bound, now = _matrix(skin.skin_to_rig), _matrix(bones.inverted_safe() @ world)
+    far = 1.0 + max(float(np.abs(_matrix(world)).max()), float(np.abs(_matrix(bones)).max()))
+    still = bool(np.allclose(now, bound, rtol=0.0, atol=2e-6 * far))
+    return (bound, True) if still else (now, False)
+
+
+def _skin_offsets(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> list[Points | None]:
+    """Rest-pose offsets of every skin: its shape keys, and its object moved against the armature since the bind."""
+    offsets: list[Points | None] = [None] * len(cage.cage_rig.skins)
+    for index, obj in health.live_skins(cage):
+        rest = running.session.snapshot.skins[index].points
+        matrix, still = _skin_to_rig(cage, index, depsgraph)
+        keys = obj.data.shape_keys
+        local = None
+        if keys is not None:
+            local = shape_keys.offsets(obj, keys.evaluated_get(depsgraph), len(rest))
+        if not still:
+            moved = matrix @ np.linalg.inv(_matrix(cage.cage_rig.skins[index].skin_to_rig))
+            offsets[index] = positions.apply_matrix(moved, rest) - rest
+        if local is not None:
+            shift = local @ matrix[:3, :3].T.astype(np.float32)
+            offsets[index] = shift if offsets[index] is None else offsets[index] + shift
+    return offsets
+
+
+def _write_back(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> None:
+    session, settings = running.session, cage.cage_rig
+    for index, obj in health.live_skins(cage):
+        if obj.data.is_editmode:
+            running.written.pop(index, None)
+            continue
+        matrix, _ = _skin_to_rig(cage, index, depsgraph)
+        state = (session.revision, matrix.tobytes())
+        if running.written.get(index) == state and modifier.ATTRIBUTE in obj.data.attributes:
+            continue
+        points = session.posed_skin(index)
+        if not np.array_equal(matrix, np.eye(4)):
+            points = positions.apply_matrix(np.linalg.inv(matrix), points)
+        modifier.write(obj, points)
+        running.written[index] = state
+    _write_posed_cage(running, settings.posed_cage)
+    _write_refit(running, settings.refit_armature)
+
+
+def _write_posed_cage(running: _Running, posed: bpy.types.Object) -> None:
+    """Write C′ where it differs from what the mesh holds. What the artist holds in Edit Mode is left alone."""
+    points = running.session.posed_cage()
+    if running.posed is not None:
+        tolerance = 1e-6 * running.session.size if posed.data.is_editmode else 0.0
+        if np.allclose(points, running.posed, rtol=0.0, atol=tolerance):
+            return
+    write = positions.write_edit_mesh if posed.data.is_editmode else positions.write_base
+    write(posed.data, points)
+    running.posed = points.copy()
+
+
+def _write_refit(running: _Running, refit: bpy.types.Object | None) -> None:
+    if refit is None or refit.mode == "EDIT" or len(refit.data.bones) != len(running.session.snapshot.heads):
+        return
+    if running.refit_rest is None:
+        running.refit_rest = armature.read_rest_matrices(refit.data)
+    state = (running.session.revision, b"")
+    if running.written.get(-1) != state:
+        armature.write_refit_pose(refit, running.refit_rest, running.session.refit_pose(running.refit_rest))
+        running.written[-1] = state
+
+
+def _matrix(matrix: object) -> Matrix:
+    return np.array(matrix, np.float64)
+
+
+def _pause(cage: bpy.types.Object, message: str) -> None:
+    settings = cage.cage_rig
+    if (settings.state, settings.message) == ("PAUSED", message):
+        return
+    owned = settings.posed_cage is None or settings.posed_cage.cage_rig.owner in (cage, None)
+    settings.state, settings.message = "PAUSED", message
+    for skin in settings.skins:
+        if owned and skin.object is not None:
+            modifier.set_shown(skin.object, False)
+            modifier.show_suspended(skin.object, True)
+
+
+def _resume(cage: bpy.types.Object, note: str) -> None:
+    settings = cage.cage_rig
+    if settings.state != "LIVE":
+        settings.state = "LIVE"
+        for _, obj in health.live_skins(cage):
+            modifier.show_suspended(obj, False)
+            modifier.set_shown(obj, True)
+    lost = health.lost_skins(cage)
+    if not note and lost:
+        note = f"{lost} skin(s) of '{cage.name}' were deleted; Rebind forgets them"
+    if settings.message != note:
+        settings.message = note
