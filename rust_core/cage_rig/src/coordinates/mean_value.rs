@@ -1,0 +1,232 @@
+//! Mean value coordinates of points with respect to a triangle mesh.
+//!
+//! Based on [JSW05] Ju, Schaefer, Warren, *Mean value coordinates for closed triangular meshes*,
+//! in vector form: the mean vector m of a spherical triangle is a sum over its sides, and the
+//! weights are the components of m along the directions to the corners. One angle per edge, so
+//! `#points · (#edges + #faces)`. Defined inside, on and outside a closed mesh.
+//!
+//! We differ from the paper where it is unstable: on the surface the distance decides (not an
+//! angle), a face seen edge-on is computed from its spherical excess ([`thin_weights`]), and what
+//! rounding leaves of linear precision is corrected by the smallest change ([`Correction`]).
+
+use crate::cage::Cage;
+use crate::points::{bounding_diagonal, Matrix3, Point};
+use crate::rows::Rows;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Points nearer than this part of the size lie *on* a vertex, an edge or a face.
+const TOUCH: f64 = 1e-12;
+
+/// Φ, `#points by #C`, of `points` (`#points by 3`): rows sum to 1 and reproduce their point.
+pub fn coordinates(cage: &Cage, points: &[Point]) -> Rows {
+    let surface = Surface::new(cage.vertices(), cage.triangles());
+    let correction = Correction::new(cage.vertices());
+    let mut rows = Rows::zeros(points.len(), cage.vertices().len());
+    rows.as_mut_slice().par_chunks_mut(cage.vertices().len()).zip(points).with_min_len(64).for_each_init(
+        Scratch::default,
+        |scratch, (row, point)| {
+            surface.weights(point, scratch, row);
+            correction.apply(cage.vertices(), point, row);
+        },
+    );
+    rows
+}
+
+/// A triangle mesh, open or closed, prepared for weights of many points.
+pub struct Surface<'a> {
+    vertices: &'a [Point],
+    edges: Vec<[u32; 2]>,
+    faces: Vec<Face>,
+    touch: f64,
+}
+
+/// A triangle with area. Side k runs between the two other corners, along edge `edges[k]`
+/// (`signs[k]` is −1 when against it).
+struct Face {
+    corners: [usize; 3],
+    edges: [usize; 3],
+    signs: [f64; 3],
+    double_area: f64,
+}
+
+/// What is known of an edge from one point: u_a × u_b, half the angle along it, the angle.
+#[derive(Clone, Copy)]
+struct Side {
+    cross: Point,
+    half: Point,
+    angle: f64,
+}
+
+/// Room for one point's work, reused from point to point.
+#[derive(Default)]
+pub struct Scratch {
+    directions: Vec<Point>,
+    distances: Vec<f64>,
+    sides: Vec<Side>,
+}
+
+impl<'a> Surface<'a> {
+    /// Prepares `vertices` (`#V by 3`) and `triangles`; triangles without area count for nothing.
+    pub fn new(vertices: &'a [Point], triangles: &[[u32; 3]]) -> Self {
+        let size = bounding_diagonal(vertices);
+        let mut known = HashMap::with_capacity(triangles.len() * 3 / 2);
+        let mut edges = Vec::with_capacity(triangles.len() * 3 / 2);
+        let mut faces = Vec::with_capacity(triangles.len());
+        for triangle in triangles {
+            let corners = triangle.map(|v| v as usize);
+            let [a, b, c] = corners.map(|v| vertices[v]);
+            let double_area = (b - a).cross(&(c - a)).norm();
+            if double_area <= TOUCH * TOUCH * size * size {
+                continue;
+            }
+            let mut face = Face { corners, edges: [0; 3], signs: [1.0; 3], double_area };
+            for k in 0..3 {
+                let (from, to) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+                let key = [from.min(to), from.max(to)];
+                face.edges[k] = *known.entry(key).or_insert_with(|| {
+                    edges.push(key);
+                    edges.len() - 1
+                });
+                face.signs[k] = if from < to { 1.0 } else { -1.0 };
+            }
+            faces.push(face);
+        }
+        Self { vertices, edges, faces, touch: TOUCH * size }
+    }
+
+    /// Writes the weights of `point` into `row` (one per vertex, sum 1; all 0 when the mesh has no
+    /// weight at all).
+    pub fn weights(&self, point: &Point, scratch: &mut Scratch, row: &mut [f64]) {
+        row.fill(0.0);
+        if self.at_vertex(point, scratch, row) || self.at_edge(scratch, row) {
+            return;
+        }
+        for face in &self.faces {
+            if self.add_face(face, scratch, row) {
+                return;
+            }
+        }
+        let sum: f64 = row.iter().sum();
+        let scale = if sum == 0.0 { 0.0 } else { 1.0 / sum };
+        row.iter_mut().for_each(|w| *w *= scale);
+    }
+
+    /// Finds distances and directions. True when the point is a vertex: then the row is done.
+    fn at_vertex(&self, point: &Point, scratch: &mut Scratch, row: &mut [f64]) -> bool {
+        scratch.directions.clear();
+        scratch.distances.clear();
+        for (k, vertex) in self.vertices.iter().enumerate() {
+            let toward = vertex - point;
+            let distance = toward.norm();
+            if distance <= self.touch {
+                row[k] = 1.0;
+                return true;
+            }
+            scratch.distances.push(distance);
+            scratch.directions.push(toward / distance);
+        }
+        false
+    }
+
+    /// Finds what edges look like. True when the point is on an edge: then the row is done.
+    fn at_edge(&self, scratch: &mut Scratch, row: &mut [f64]) -> bool {
+        scratch.sides.clear();
+        for &[a, b] in &self.edges {
+            let (a, b) = (a as usize, b as usize);
+            let (from, to) = (scratch.directions[a], scratch.directions[b]);
+            let (cross, cosine) = (from.cross(&to), from.dot(&to));
+            let sine = cross.norm();
+            if cosine < 0.0 {
+                let (near, far) = (scratch.distances[a], scratch.distances[b]);
+                if sine * near * far <= self.touch * (near + far) {
+                    row[a] = far / (near + far);
+                    row[b] = near / (near + far);
+                    return true;
+                }
+            }
+            let angle = sine.atan2(cosine);
+            let ratio = if sine > 0.0 { angle / sine } else { 1.0 };
+            scratch.sides.push(Side { cross, half: cross * (0.5 * ratio), angle });
+        }
+        false
+    }
+
+    /// Adds one face's weights. True when the point is on it: then the row is done.
+    fn add_face(&self, face: &Face, scratch: &Scratch, row: &mut [f64]) -> bool {
+        let sides = face.edges.map(|e| scratch.sides[e]);
+        let distances = face.corners.map(|v| scratch.distances[v]);
+        let crosses: [Point; 3] = std::array::from_fn(|k| sides[k].cross * face.signs[k]);
+        let determinant = scratch.directions[face.corners[0]].dot(&crosses[0]);
+        let height = determinant.abs() * distances[0] * distances[1] * distances[2] / face.double_area;
+        // Cosines of the angles between the sides at each corner, up to a positive factor.
+        let turns: [f64; 3] = std::array::from_fn(|k| -crosses[(k + 1) % 3].dot(&crosses[(k + 2) % 3]));
+        if height <= self.touch {
+            if turns.iter().any(|&turn| turn > 0.0) {
+                return false; // in the face's plane, outside it: no weight
+            }
+            // On the face: barycentric coordinates, from the areas opposite the corners.
+            row.fill(0.0);
+            let areas: [f64; 3] =
+                std::array::from_fn(|k| crosses[k].norm() * distances[(k + 1) % 3] * distances[(k + 2) % 3]);
+            (0..3).for_each(|k| row[face.corners[k]] = areas[k] / areas.iter().sum::<f64>());
+            return true;
+        }
+        let sines = crosses.map(|c| c.norm());
+        let components = thin_weights(&sides.map(|s| s.angle), &sines, &turns, determinant).unwrap_or_else(|| {
+            let mean: Point = (0..3).map(|k| sides[k].half * face.signs[k]).sum();
+            crosses.map(|cross| mean.dot(&cross) / determinant)
+        });
+        (0..3).for_each(|k| row[face.corners[k]] += components[k] / distances[k]);
+        false
+    }
+}
+
+/// The components of the mean vector of a spherical triangle that is nearly an arc, corner A on
+/// side a opposite it: `(θ_i − cos α_j θ_k − cos α_k θ_j) · sin θ_i / 2 det` [JSW05], with the
+/// differences that cancel there taken from det² = 4 sin h sin(h − a) sin(h − b) sin(h − c).
+/// `None` for any other triangle.
+fn thin_weights(angles: &[f64; 3], sines: &[f64; 3], turns: &[f64; 3], determinant: f64) -> Option<[f64; 3]> {
+    let a = (0..3).find(|&k| turns[k] < 0.0 && turns[(k + 1) % 3] > 0.0 && turns[(k + 2) % 3] > 0.0)?;
+    let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+    let corner_sine = |i: usize, j: usize| determinant.abs() / (sines[i] * sines[j]);
+    let (sine_a, sine_b, sine_c) = (corner_sine(b, c), corner_sine(a, c), corner_sine(a, b));
+    if sine_b.max(sine_c).max(sine_a) > 0.03 {
+        return None;
+    }
+    // 1 − |cos α| of each corner.
+    let from_flat = |sine: f64| sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
+    let (flat_a, flat_b, flat_c) = (from_flat(sine_a), from_flat(sine_b), from_flat(sine_c));
+    let half = 0.5 * (angles[0] + angles[1] + angles[2]);
+    let others = half.sin() * (half - angles[b]).sin() * (half - angles[c]).sin();
+    let excess = 2.0 * (determinant * determinant / (4.0 * others)).asin(); // θ_b + θ_c − θ_a
+    let mut numerators = [0.0; 3];
+    numerators[a] = flat_b * angles[c] + flat_c * angles[b] - excess;
+    numerators[b] = excess - flat_a * angles[c] + flat_c * angles[a];
+    numerators[c] = excess - flat_a * angles[b] + flat_b * angles[a];
+    let components = std::array::from_fn(|k| numerators[k] * sines[k] / (2.0 * determinant));
+    components.iter().all(|x: &f64| x.is_finite()).then_some(components)
+}
+
+/// The smallest change of a row that makes it reproduce its point.
+struct Correction {
+    middle: Point,
+    spread_inverse: Option<Matrix3>,
+    tolerance: f64,
+}
+
+impl Correction {
+    fn new(vertices: &[Point]) -> Self {
+        let middle = vertices.iter().sum::<Point>() / vertices.len() as f64;
+        let spread: Matrix3 = vertices.iter().map(|c| (c - middle) * (c - middle).transpose()).sum();
+        Self { middle, spread_inverse: spread.try_inverse(), tolerance: 1e-14 * bounding_diagonal(vertices) }
+    }
+
+    fn apply(&self, vertices: &[Point], point: &Point, row: &mut [f64]) {
+        let miss: Point = row.iter().zip(vertices).map(|(w, c)| *w * (c - point)).sum();
+        if let (true, Some(inverse)) = (miss.norm() > self.tolerance, self.spread_inverse) {
+            let slope = inverse * miss;
+            row.iter_mut().zip(vertices).for_each(|(w, c)| *w -= slope.dot(&(c - self.middle)));
+        }
+    }
+}

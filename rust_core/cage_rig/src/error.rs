@@ -1,0 +1,182 @@
+//! Errors: facts about the input that the user can act on, each with its numbers.
+//!
+//! One enum for each thing a user brings (cage, skin, weights, skeleton, pose). They are raised
+//! where input enters; an edit that returns one has changed nothing.
+
+use thiserror::Error;
+
+/// Anything that can be wrong with what was handed in.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Error {
+    /// The cage cannot enclose anything.
+    #[error(transparent)]
+    Cage(#[from] CageError),
+    /// The skin mesh is malformed.
+    #[error(transparent)]
+    Skin(#[from] SkinError),
+    /// The skin weights are malformed.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// The skeleton is malformed.
+    #[error(transparent)]
+    Skeleton(#[from] SkeletonError),
+    /// An edit cannot be carried out.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// An argument names no member of a family.
+    #[error("there is no {family} named {name:?}; known: {known}")]
+    UnknownName {
+        /// What was looked up ("skinning method", "coordinates").
+        family: &'static str,
+        /// The name given.
+        name: String,
+        /// The names that exist, comma separated.
+        known: String,
+    },
+    /// A precomputed matrix or list has the wrong size.
+    #[error("{argument} must have {expected} {unit}, found {found}")]
+    Size {
+        /// The argument's name.
+        argument: &'static str,
+        /// What is counted ("rows", "columns", "entries").
+        unit: &'static str,
+        /// How many there must be.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// A number is NaN or infinite.
+    #[error("{argument} has a value that is not finite in row {row}")]
+    NotFinite {
+        /// The argument's name.
+        argument: &'static str,
+        /// The first such row.
+        row: usize,
+    },
+    /// An option is out of its range.
+    #[error("option {option} must be {expected}, found {found}")]
+    Option {
+        /// The option's name.
+        option: &'static str,
+        /// The range in words.
+        expected: &'static str,
+        /// The value given.
+        found: f64,
+    },
+}
+
+/// Why a mesh cannot serve as a cage. Faces are counted as the caller gave them.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs)] // every field is the number that its message prints
+pub enum CageError {
+    #[error("the cage has {vertices} vertices and {faces} faces; a closed cage needs at least 4 of each")]
+    TooSmall { vertices: usize, faces: usize },
+    #[error("cage face {face} has {corners} corners; a face needs at least 3")]
+    FewCorners { face: usize, corners: usize },
+    #[error("cage face {face} uses vertex {vertex}, but the cage has {vertices} vertices")]
+    BadIndex { face: usize, vertex: i64, vertices: usize },
+    #[error("cage face {face} uses vertex {vertex} twice")]
+    RepeatedCorner { face: usize, vertex: usize },
+    #[error("cage vertex {vertex} has a coordinate that is not finite")]
+    NotFinite { vertex: usize },
+    #[error("cage vertex {vertex} belongs to no face")]
+    UnusedVertex { vertex: usize },
+    #[error("cage vertices {first} and {second} are at the same place")]
+    CoincidentVertices { first: usize, second: usize },
+    #[error("cage face {face} has no area")]
+    DegenerateFace { face: usize },
+    #[error("the cage is open: edge {a}-{b} belongs to face {face} only")]
+    OpenEdge { a: usize, b: usize, face: usize },
+    #[error("the cage is not manifold: edge {a}-{b} belongs to {count} faces")]
+    NonManifoldEdge { a: usize, b: usize, count: usize },
+    #[error("the cage is not manifold: its faces meet at vertex {vertex} in {fans} separate fans")]
+    NonManifoldVertex { vertex: usize, fans: usize },
+    #[error("cage face {face} is flipped against its neighbours ({count} flipped in all)")]
+    FlippedFace { face: usize, count: usize },
+    #[error("the cage has one side only: no orientation of its faces agrees at edge {a}-{b}")]
+    NotOrientable { a: usize, b: usize },
+    #[error("the part of the cage that holds face {face} is inside out against the rest")]
+    InsideOutPart { face: usize },
+    #[error("the cage encloses no volume")]
+    NoVolume,
+}
+
+/// Why a mesh cannot serve as a skin.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs)]
+pub enum SkinError {
+    #[error("the skin has no vertices")]
+    Empty,
+    #[error("skin face {face} has {corners} corners; a face needs at least 3")]
+    FewCorners { face: usize, corners: usize },
+    #[error("skin face {face} uses vertex {vertex}, but the skin has {vertices} vertices")]
+    BadIndex { face: usize, vertex: i64, vertices: usize },
+    #[error("the offsets of the rest skin have {found} rows; the skin has {expected} vertices")]
+    OffsetCount { expected: usize, found: usize },
+    #[error("row {row} of the offsets of the rest skin is not finite")]
+    OffsetNotFinite { row: usize },
+    #[error("anchor {vertex} is not a skin vertex (there are {vertices})")]
+    BadAnchor { vertex: i64, vertices: usize },
+    #[error("anchor {vertex} is listed twice")]
+    RepeatedAnchor { vertex: usize },
+}
+
+/// Why weights cannot bind a skin to joints.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs)]
+pub enum WeightsError {
+    #[error("the weight of vertex {vertex} for joint {joint} is negative ({weight})")]
+    Negative { vertex: usize, joint: usize, weight: f64 },
+    #[error("the weight of vertex {vertex} for joint {joint} is not a finite number")]
+    NotFinite { vertex: usize, joint: usize },
+    #[error("vertex {vertex} has a weight for joint {joint}, but there are {joints} joints")]
+    BadJoint { vertex: usize, joint: i64, joints: usize },
+    #[error("the weights have {found} rows; the skin has {expected} vertices")]
+    RowCount { expected: usize, found: usize },
+    #[error("the weights have {found} columns; the skeleton has {expected} joints")]
+    ColumnCount { expected: usize, found: usize },
+    #[error("indptr must start at 0, never fall, and end at the number of weights ({data}); entry {entry} breaks this")]
+    BadIndptr { entry: usize, data: usize },
+    #[error("there are {indices} joint indices for {data} weights")]
+    Lengths { indices: usize, data: usize },
+}
+
+/// Why joints and parents are no skeleton.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs)]
+pub enum SkeletonError {
+    #[error("the skeleton has no joints")]
+    Empty,
+    #[error("there are {parents} parents for {joints} joints")]
+    ParentCount { joints: usize, parents: usize },
+    #[error("joint {joint} has parent {parent}, but there are {joints} joints (-1 marks a root)")]
+    BadParent { joint: usize, parent: i64, joints: usize },
+    #[error("joint {joint} is its own ancestor")]
+    Cycle { joint: usize },
+    #[error("joint {joint} has a coordinate that is not finite")]
+    NotFinite { joint: usize },
+}
+
+/// Why an edit cannot be carried out. The rig is as it was before.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs)]
+pub enum PoseError {
+    #[error("there are {found} transforms; the skeleton has {expected} joints")]
+    TransformCount { expected: usize, found: usize },
+    #[error("the transform of joint {joint} has a value that is not finite")]
+    TransformNotFinite { joint: usize },
+    #[error("the transform of joint {joint} is not affine: its last row must be 0 0 0 1")]
+    NotAffine { joint: usize },
+    #[error("there are {found} rest joints; the skeleton has {expected} joints")]
+    JointCount { expected: usize, found: usize },
+    #[error("rest joint {joint} has a coordinate that is not finite")]
+    JointNotFinite { joint: usize },
+    #[error("the edited cage has {found} vertices; the bound one has {expected}")]
+    CageCount { expected: usize, found: usize },
+    #[error("vertex {vertex} of the edited cage has a coordinate that is not finite")]
+    CageNotFinite { vertex: usize },
+    #[error("in this pose the posed cage cannot be edited: a bone is squashed flat, so no rest cage gives the wanted one (pivot ratio {pivot_ratio:.1e})")]
+    Singular { pivot_ratio: f64 },
+    #[error("in this pose the posed cage cannot be edited: the closest rest cage misses the wanted one by {miss:.1e} of the size")]
+    Unreachable { miss: f64 },
+}

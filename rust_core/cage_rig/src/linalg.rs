@@ -1,0 +1,84 @@
+//! Dense linear algebra, the only file that names faer: LU, SVD, products.
+
+use crate::points::Point;
+use crate::rows::Rows;
+use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::{PartialPivLu, Solve};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+fn view(rows: &Rows) -> MatRef<'_, f64> {
+    MatRef::from_row_major_slice(rows.as_slice(), rows.len(), rows.columns())
+}
+
+fn to_rows(matrix: MatRef<'_, f64>) -> Rows {
+    let mut rows = Rows::zeros(matrix.nrows(), matrix.ncols());
+    for i in 0..matrix.nrows() {
+        rows.row_mut(i).iter_mut().enumerate().for_each(|(j, x)| *x = matrix[(i, j)]);
+    }
+    rows
+}
+
+/// A · B.
+pub(crate) fn product(a: &Rows, b: &Rows) -> Rows {
+    let mut out = Rows::zeros(a.len(), b.columns());
+    let shape = (out.len(), out.columns());
+    let target = MatMut::from_row_major_slice_mut(out.as_mut_slice(), shape.0, shape.1);
+    matmul(target, Accum::Replace, view(a), view(b), 1.0, Par::Seq);
+    out
+}
+
+/// The factors of a square matrix, made once and solved with often.
+#[derive(Debug, Clone)]
+pub(crate) struct Lu {
+    factors: PartialPivLu<f64>,
+}
+
+impl Lu {
+    /// Factors `square`. Costs ⅔ n³.
+    pub(crate) fn new(square: &Rows) -> Self {
+        Self { factors: view(square).partial_piv_lu() }
+    }
+
+    /// Smallest over largest pivot: 0 (or NaN) for a singular matrix, tiny for a nearly singular one.
+    pub(crate) fn pivot_ratio(&self) -> f64 {
+        let u = self.factors.U();
+        let pivots = (0..u.nrows()).map(|i| u[(i, i)].abs());
+        let (low, high) = pivots.fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), p| (l.min(p), h.max(p)));
+        if high > 0.0 && high.is_finite() { low / high } else { 0.0 }
+    }
+
+    /// Solves for three right sides at once, one per coordinate.
+    pub(crate) fn solve_points(&self, right: &[Point]) -> Vec<Point> {
+        let right = Mat::from_fn(right.len(), 3, |i, d| right[i][d]);
+        let x = self.factors.solve(&right);
+        (0..x.nrows()).map(|i| Point::new(x[(i, 0)], x[(i, 1)], x[(i, 2)])).collect()
+    }
+
+    /// Solves for one right side of 3n numbers, x y z of each point in turn.
+    pub(crate) fn solve_interleaved(&self, right: &[Point]) -> Vec<Point> {
+        let right = Mat::from_fn(right.len() * 3, 1, |i, _| right[i / 3][i % 3]);
+        let x = self.factors.solve(&right);
+        (0..x.nrows() / 3).map(|i| Point::new(x[(3 * i, 0)], x[(3 * i + 1, 0)], x[(3 * i + 2, 0)])).collect()
+    }
+
+    /// A⁻¹.
+    pub(crate) fn inverse(&self) -> Rows {
+        let size = self.factors.U().nrows();
+        to_rows(self.factors.solve(&Mat::<f64>::identity(size, size)).as_ref())
+    }
+}
+
+/// A = U Σ Vᵀ, thin: singular values fall.
+pub(crate) struct Svd {
+    pub(crate) u: Rows,
+    pub(crate) singular_values: Vec<f64>,
+    pub(crate) v: Rows,
+}
+
+/// The thin singular value decomposition; `None` if the iteration fails (input not finite).
+pub(crate) fn svd(matrix: &Rows) -> Option<Svd> {
+    let found = view(matrix).thin_svd().ok()?;
+    let values = found.S().column_vector();
+    let singular_values = (0..values.nrows()).map(|i| values[i]).collect();
+    Some(Svd { u: to_rows(found.U()), singular_values, v: to_rows(found.V()) })
+}

@@ -1,0 +1,49 @@
+//! Points and the affine maps that move them.
+
+/// A point or vector, in rig space.
+pub type Point = nalgebra::Vector3<f64>;
+/// A 3 by 3 matrix acting on columns.
+pub type Matrix3 = nalgebra::Matrix3<f64>;
+
+/// An affine map `v ↦ linear · v + translation`. The linear part may rotate, scale and shear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transform {
+    /// R: the linear part.
+    pub linear: Matrix3,
+    /// t: where the origin goes.
+    pub translation: Point,
+}
+
+impl Transform {
+    /// The map that moves nothing.
+    pub fn identity() -> Self {
+        Self { linear: Matrix3::identity(), translation: Point::zeros() }
+    }
+
+    /// The image of `point`.
+    pub fn apply(&self, point: &Point) -> Point {
+        self.linear * point + self.translation
+    }
+
+    /// True when every entry is finite.
+    pub fn is_finite(&self) -> bool {
+        self.linear.iter().chain(self.translation.iter()).all(|x| x.is_finite())
+    }
+}
+
+/// The index of the first point with a coordinate that is not finite.
+pub(crate) fn first_not_finite(points: &[Point]) -> Option<usize> {
+    points.iter().position(|p| !p.iter().all(|x| x.is_finite()))
+}
+
+/// The diagonal of the bounding box of `points`: the *size* that every tolerance is relative to.
+pub fn bounding_diagonal(points: &[Point]) -> f64 {
+    let Some(first) = points.first() else { return 0.0 };
+    let (low, high) = points.iter().fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
+    (high - low).norm()
+}
+
+/// `points` in the single precision of the frame arrays.
+pub(crate) fn to_f32(points: &[Point]) -> Vec<[f32; 3]> {
+    points.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect()
+}

@@ -1,0 +1,247 @@
+//! Bind: everything that is computed once, from the three meshes at rest.
+//!
+//! Φ, Ψ, anchors, the factors of CageUp and the packed frame arrays. Cost: `#M · #C` with a large
+//! constant for Φ, `#M · #C²` for the anchors. What had to be done is told in a [`Report`].
+
+use super::cage_updater::CageUpdater;
+use super::joint_coordinates::{joint_coordinates, SkinAtRest};
+use super::maxvol::{maxvol, ratio_of, MaxVol, MaxVolOptions};
+use super::rest_skin::RestSkin;
+use super::skeleton_updater::SkeletonUpdater;
+use crate::cage::Cage;
+use crate::coordinates::CoordinateKind;
+use crate::error::{Error, SkinError, WeightsError};
+use crate::mesh::{triangulate, FaceFault, Polygons};
+use crate::points::{bounding_diagonal, first_not_finite, Point};
+use crate::rows::Rows;
+use crate::skeleton::Skeleton;
+use crate::skinning::{PackedWeights, SkinningMethod};
+use crate::weights::SkinWeights;
+use std::collections::HashSet;
+
+/// What is bound. All in rig space.
+#[derive(Debug, Clone)]
+pub struct BindInput {
+    /// M₀, `#M by 3`.
+    pub skin_vertices: Vec<Point>,
+    /// Faces of the skin, open or closed; may be empty.
+    pub skin_faces: Polygons,
+    /// Ω, `#M by #J`.
+    pub skin_weights: SkinWeights,
+    /// a₀ and the hierarchy.
+    pub skeleton: Skeleton,
+    /// C₀ and its faces.
+    pub cage: Cage,
+    /// How bones move the skin.
+    pub method: &'static SkinningMethod,
+    /// How the cage moves the skin.
+    pub coordinates: &'static CoordinateKind,
+    /// What is already known and need not be computed.
+    pub known: Known,
+    /// Limits and exponents.
+    pub options: BindOptions,
+}
+
+/// Results of an earlier bind, taken as they are.
+#[derive(Debug, Clone, Default)]
+pub struct Known {
+    /// min(`#M`, `#C`) skin vertices.
+    pub anchors: Option<Vec<i64>>,
+    /// Φ, `#M by #C`.
+    pub cage_coords: Option<Rows>,
+    /// Ψ, `#J by #C`.
+    pub joint_coords: Option<Rows>,
+    /// Λ, `#M by #C`: kept for methods that rotate about centers.
+    pub center_coords: Option<Rows>,
+}
+
+/// Limits and exponents of a bind.
+#[derive(Debug, Clone, Copy)]
+pub struct BindOptions {
+    /// When the choice of anchors is good enough.
+    pub maxvol: MaxVolOptions,
+    /// s of Eq. (9); 0.1 as in the paper.
+    pub locality_exponent: f64,
+    /// τ of CageUp, relative to the largest singular value of Φ̃. Measured: the Arm's smallest is
+    /// above ten times the default.
+    pub min_singular: f64,
+}
+
+impl Default for BindOptions {
+    fn default() -> Self {
+        Self { maxvol: MaxVolOptions::default(), locality_exponent: 0.1, min_singular: 1e-3 }
+    }
+}
+
+/// What a bind found and did.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Report {
+    /// The cage came inside out and was turned.
+    pub cage_turned: bool,
+    /// Joints outside the convex hull of the cage.
+    pub joints_outside_hull: Vec<usize>,
+    /// Joints whose bone has no weights, or blends with no other: plain cage coordinates.
+    pub unweighted_joints: Vec<usize>,
+    /// Skin vertices without weights, not moved by the skeleton.
+    pub unweighted_vertices: usize,
+    /// max |Φ Φ̃⁻¹|.
+    pub anchor_max_ratio: f64,
+    /// Swaps MaxVol made.
+    pub anchor_swaps: usize,
+    /// Largest over smallest singular value of Φ̃.
+    pub anchor_condition: f64,
+    /// Directions of the posed cage that are attenuated toward the skinned cage.
+    pub regularised: usize,
+    /// max |Ψ C₀ − a₀|.
+    pub joint_error_max: f64,
+    /// max |Φ C₀ − M₀|.
+    pub coordinate_error_max: f64,
+}
+
+/// Everything computed at bind; never changes.
+#[derive(Debug, Clone)]
+pub struct Binding {
+    pub(super) method: &'static SkinningMethod,
+    pub(super) cage: Cage,
+    pub(super) cage_coords: Rows,
+    pub(super) center_coords: Option<Rows>,
+    pub(super) anchors: Vec<usize>,
+    pub(super) rest_skin: RestSkin,
+    pub(super) packed_weights: PackedWeights,
+    pub(super) cage_updater: CageUpdater,
+    pub(super) skeleton_updater: SkeletonUpdater,
+    pub(super) report: Report,
+    pub(super) size: f64,
+}
+
+impl Binding {
+    /// Computes what is not known.
+    pub fn new(input: BindInput) -> Result<Self, Error> {
+        check_options(&input.options)?;
+        let triangles = check_skin(&input)?;
+        let BindInput { skin_vertices: skin, skin_weights: weights, skeleton, cage, known, options, .. } = input;
+        let (rows, columns, joints) = (skin.len(), cage.vertices().len(), skeleton.len());
+
+        let cage_coords = match checked(known.cage_coords, "cage_coords", rows, columns)? {
+            Some(coords) => coords,
+            None => (input.coordinates.compute)(&cage, &skin),
+        };
+        let chosen = match known.anchors {
+            Some(anchors) => given_anchors(&anchors, &cage_coords)?,
+            None => maxvol(&cage_coords, &options.maxvol),
+        };
+        let mut report = Report {
+            cage_turned: cage.turned(),
+            unweighted_vertices: (0..rows).filter(|&i| weights.row(i).is_empty()).count(),
+            anchor_max_ratio: chosen.ratio,
+            anchor_swaps: chosen.swaps,
+            coordinate_error_max: largest_miss(&cage_coords, cage.vertices(), &skin),
+            ..Report::default()
+        };
+        let joint_coords = match checked(known.joint_coords, "joint_coords", joints, columns)? {
+            Some(coords) => coords,
+            None => {
+                let at_rest =
+                    SkinAtRest { vertices: &skin, triangles: &triangles, weights: &weights, cage_coords: &cage_coords };
+                let found = joint_coordinates(&cage, &at_rest, skeleton.joints(), options.locality_exponent);
+                report.joints_outside_hull = found.outside_hull;
+                report.unweighted_joints = found.without_locality;
+                found.coords
+            }
+        };
+        report.joint_error_max = largest_miss(&joint_coords, cage.vertices(), skeleton.joints());
+        let cage_updater =
+            CageUpdater::new(&chosen.rows, &cage_coords, &skin, &weights, cage.vertices(), options.min_singular);
+        report.anchor_condition = cage_updater.condition();
+        report.regularised = cage_updater.attenuated();
+        Ok(Self {
+            method: input.method,
+            center_coords: checked(known.center_coords, "center_coords", rows, columns)?,
+            anchors: chosen.rows,
+            rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords),
+            packed_weights: PackedWeights::new(&weights),
+            cage_updater,
+            skeleton_updater: SkeletonUpdater::new(skeleton, joint_coords, cage.vertices()),
+            report,
+            size: bounding_diagonal(&skin),
+            cage_coords,
+            cage,
+        })
+    }
+}
+
+fn check_options(options: &BindOptions) -> Result<(), Error> {
+    let fail = |option, expected, found| Err(Error::Option { option, expected, found });
+    if !(options.maxvol.max_ratio >= 1.0) {
+        return fail("max_anchor_ratio", "at least 1", options.maxvol.max_ratio);
+    }
+    if !(options.locality_exponent > 0.0 && options.locality_exponent < 1.0) {
+        return fail("locality_exponent", "between 0 and 1", options.locality_exponent);
+    }
+    if !(options.min_singular >= 0.0 && options.min_singular < 1.0) {
+        return fail("min_singular", "at least 0 and below 1", options.min_singular);
+    }
+    Ok(())
+}
+
+/// Checks that skin, weights and joints fit; returns the skin's triangles.
+fn check_skin(input: &BindInput) -> Result<Vec<[u32; 3]>, Error> {
+    let vertices = input.skin_vertices.len();
+    if vertices == 0 {
+        return Err(SkinError::Empty.into());
+    }
+    if let Some(row) = first_not_finite(&input.skin_vertices) {
+        return Err(Error::NotFinite { argument: "skin_vertices", row });
+    }
+    if input.skin_weights.len() != vertices {
+        return Err(WeightsError::RowCount { expected: vertices, found: input.skin_weights.len() }.into());
+    }
+    if input.skin_weights.joints() != input.skeleton.len() {
+        let (expected, found) = (input.skeleton.len(), input.skin_weights.joints());
+        return Err(WeightsError::ColumnCount { expected, found }.into());
+    }
+    let pieces = triangulate(&input.skin_vertices, &input.skin_faces).map_err(|fault| match fault {
+        FaceFault::FewCorners { face, corners } => SkinError::FewCorners { face, corners },
+        FaceFault::BadIndex { face, vertex } => SkinError::BadIndex { face, vertex, vertices },
+    })?;
+    Ok(pieces.iter().map(|piece| piece.corners).collect())
+}
+
+fn checked(given: Option<Rows>, argument: &'static str, rows: usize, columns: usize) -> Result<Option<Rows>, Error> {
+    let Some(given) = given else { return Ok(None) };
+    if given.columns() != columns {
+        return Err(Error::Size { argument, unit: "columns", expected: columns, found: given.columns() });
+    }
+    if given.len() != rows {
+        return Err(Error::Size { argument, unit: "rows", expected: rows, found: given.len() });
+    }
+    match given.first_not_finite() {
+        Some(row) => Err(Error::NotFinite { argument, row }),
+        None => Ok(Some(given)),
+    }
+}
+
+fn given_anchors(anchors: &[i64], cage_coords: &Rows) -> Result<MaxVol, Error> {
+    let vertices = cage_coords.len();
+    let wanted = vertices.min(cage_coords.columns());
+    if anchors.len() != wanted {
+        return Err(Error::Size { argument: "anchors", unit: "entries", expected: wanted, found: anchors.len() });
+    }
+    let mut seen = HashSet::with_capacity(wanted);
+    let mut rows = Vec::with_capacity(wanted);
+    for &vertex in anchors {
+        let row = usize::try_from(vertex).ok().filter(|&v| v < vertices);
+        let row = row.ok_or(SkinError::BadAnchor { vertex, vertices })?;
+        if !seen.insert(row) {
+            return Err(SkinError::RepeatedAnchor { vertex: row }.into());
+        }
+        rows.push(row);
+    }
+    let ratio = if wanted == vertices { 1.0 } else { ratio_of(cage_coords, &rows) };
+    Ok(MaxVol { rows, ratio, swaps: 0 })
+}
+
+fn largest_miss(coords: &Rows, cage: &[Point], points: &[Point]) -> f64 {
+    let found = coords.times(cage);
+    found.iter().zip(points).map(|(f, p)| (f - p).norm()).fold(0.0, f64::max)
+}

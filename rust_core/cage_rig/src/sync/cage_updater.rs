@@ -1,0 +1,184 @@
+//! CageUp: the posed cage that belongs to the posed skin.
+//!
+//! Based on [CTL*20] Eq. (8): Φ̃ C′ = M̃′, where Φ̃ are the rows of Φ at c anchor vertices chosen by
+//! MaxVol. Factored once at bind; one solve of `#C²` per call. The anchors are posed by linear
+//! blending whatever moves the visible skin, so that CageRev can be exact for every method.
+//!
+//! A cage vertex that hardly touches the skin makes Φ̃ singular, and Eq. (8) throws it far away.
+//! Singular values below a limit τ are attenuated toward the cage skinned by weights carried over
+//! to it, C_s: C′ = C_s + V f(Σ) Uᵀ (M̃′ − Φ̃ C_s), with f(σ) = 1/σ from τ on and σ/τ² below.
+//! Where nothing is below τ this is Eq. (8). All in displacements from rest, exact at rest.
+
+use crate::linalg::{product, svd, Lu};
+use crate::points::{Matrix3, Point, Transform};
+use crate::rows::Rows;
+use crate::skinning::lbs::{blended_linear, pose_points};
+use crate::weights::SkinWeights;
+
+/// Anchors and cage of the bind, and the factors of Φ̃.
+#[derive(Debug, Clone)]
+pub struct CageUpdater {
+    anchor_coords: Rows,
+    anchor_rest: Vec<Point>,
+    anchor_weights: SkinWeights,
+    cage: Vec<Point>,
+    fit: Fit,
+    condition: f64,
+}
+
+/// How the cage is found from the anchors.
+#[derive(Debug, Clone)]
+enum Fit {
+    /// Eq. (8).
+    Exact(Lu),
+    /// P = V f(Σ) Uᵀ (`#C by #anchors`), Q = I − P Φ̃, the weights of C_s, and how many of the
+    /// `#C` directions are attenuated.
+    Regularised { from_anchors: Rows, from_cage: Rows, cage_weights: SkinWeights, attenuated: usize },
+}
+
+/// The linear map of a change of the rest cage to the change of the posed one, before the bones'
+/// translations: blended linear parts at anchors and cage. See `cage_reverser.rs`.
+pub(super) enum Side<'a> {
+    /// Everything at the anchors: Eq. (19) as printed.
+    Anchors,
+    /// P, Q and the weights of C_s.
+    Both { from_anchors: &'a Rows, from_cage: &'a Rows, cage_weights: &'a SkinWeights },
+}
+
+impl CageUpdater {
+    /// Factors Φ̃. `anchors` are rows of `cage_coords` (Φ, `#M by #C`), `skin` is M₀, `weights` Ω,
+    /// `cage` C₀; `min_singular` is τ relative to the largest singular value.
+    pub fn new(
+        anchors: &[usize],
+        cage_coords: &Rows,
+        skin: &[Point],
+        weights: &SkinWeights,
+        cage: &[Point],
+        min_singular: f64,
+    ) -> Self {
+        let anchor_coords = cage_coords.select(anchors);
+        let (fit, condition) = fit(&anchor_coords, min_singular, || cage_skin_weights(cage_coords, weights));
+        Self {
+            anchor_coords,
+            anchor_rest: anchors.iter().map(|&i| skin[i]).collect(),
+            anchor_weights: weights.select(anchors),
+            cage: cage.to_vec(),
+            fit,
+            condition,
+        }
+    }
+
+    /// Largest over smallest singular value of Φ̃.
+    pub fn condition(&self) -> f64 {
+        self.condition
+    }
+
+    /// Directions that are attenuated; 0 where Eq. (8) is solved as printed.
+    pub fn attenuated(&self) -> usize {
+        match &self.fit {
+            Fit::Exact(_) => 0,
+            Fit::Regularised { attenuated, .. } => *attenuated,
+        }
+    }
+
+    /// The posed cage C′ (`#C by 3`) of rest cage `cage` (C) under `transforms`, Eq. (8).
+    pub fn posed_cage(&self, cage: &[Point], transforms: &[Transform]) -> Vec<Point> {
+        let moved: Vec<Point> = cage.iter().zip(&self.cage).map(|(c, c0)| c - c0).collect();
+        let rest: Vec<Point> = (0..self.anchor_rest.len())
+            .map(|i| self.anchor_rest[i] + self.anchor_coords.combine(i, &moved))
+            .collect();
+        let posed = pose_points(transforms, &self.anchor_weights, &rest);
+        let steps: Vec<Point> = posed.iter().zip(&rest).map(|(p, r)| p - r).collect();
+        match &self.fit {
+            Fit::Exact(lu) => add(cage, &lu.solve_points(&steps)),
+            Fit::Regularised { from_anchors, from_cage, cage_weights, .. } => {
+                let skinned = pose_points(transforms, cage_weights, cage);
+                let cage_steps: Vec<Point> = skinned.iter().zip(cage).map(|(s, c)| s - c).collect();
+                add(&add(cage, &from_anchors.times(&steps)), &from_cage.times(&cage_steps))
+            }
+        }
+    }
+
+    pub(super) fn side(&self) -> Side<'_> {
+        match &self.fit {
+            Fit::Exact(_) => Side::Anchors,
+            Fit::Regularised { from_anchors, from_cage, cage_weights, .. } => {
+                Side::Both { from_anchors, from_cage, cage_weights }
+            }
+        }
+    }
+
+    /// Φ̃, `#anchors by #C`.
+    pub fn anchor_coords(&self) -> &Rows {
+        &self.anchor_coords
+    }
+
+    /// Ω̃, the rows of Ω at the anchors.
+    pub fn anchor_weights(&self) -> &SkinWeights {
+        &self.anchor_weights
+    }
+
+    /// R̃ of Eq. (19): the blended linear part at each anchor.
+    pub(super) fn anchor_linear(&self, linear: &[Matrix3]) -> Vec<Matrix3> {
+        blended_linear(linear, &self.anchor_weights)
+    }
+}
+
+fn add(a: &[Point], b: &[Point]) -> Vec<Point> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
+}
+
+fn fit(anchor_coords: &Rows, min_singular: f64, cage_weights: impl Fn() -> SkinWeights) -> (Fit, f64) {
+    let count = anchor_coords.columns();
+    let exact = |condition| (Fit::Exact(Lu::new(anchor_coords)), condition);
+    let Some(svd) = svd(anchor_coords) else { return exact(f64::INFINITY) };
+    let largest = svd.singular_values.first().copied().unwrap_or(0.0);
+    let smallest = svd.singular_values.last().copied().unwrap_or(0.0);
+    let missing = count - svd.singular_values.len();
+    let condition = if missing > 0 { f64::INFINITY } else { largest / smallest };
+    let limit = min_singular * largest;
+    let attenuated = missing + svd.singular_values.iter().filter(|s| **s < limit).count();
+    if attenuated == 0 {
+        return exact(condition);
+    }
+    let mut scaled = svd.v;
+    for k in 0..count {
+        for (x, &s) in scaled.row_mut(k).iter_mut().zip(&svd.singular_values) {
+            *x *= if s >= limit { 1.0 / s } else { s / (limit * limit) };
+        }
+    }
+    let from_anchors = product(&scaled, &transposed(&svd.u));
+    let mut from_cage = product(&from_anchors, anchor_coords);
+    for k in 0..count {
+        from_cage.row_mut(k).iter_mut().for_each(|x| *x = -*x);
+        from_cage.row_mut(k)[k] += 1.0;
+    }
+    (Fit::Regularised { from_anchors, from_cage, cage_weights: cage_weights(), attenuated }, condition)
+}
+
+fn transposed(matrix: &Rows) -> Rows {
+    let mut out = Rows::zeros(matrix.columns(), matrix.len());
+    for i in 0..matrix.len() {
+        matrix.row(i).iter().enumerate().for_each(|(k, x)| out.row_mut(k)[i] = *x);
+    }
+    out
+}
+
+/// The skin weights carried over to the cage: w_k = Σ_i φ_ik² ω_i / Σ_i φ_ik². A cage vertex that
+/// touches no skin vertex at all gets no weights and stands still.
+pub fn cage_skin_weights(cage_coords: &Rows, weights: &SkinWeights) -> SkinWeights {
+    let mut sums = Rows::zeros(cage_coords.columns(), weights.joints());
+    let mut totals = vec![0.0; cage_coords.columns()];
+    for i in 0..cage_coords.len() {
+        for (k, phi) in cage_coords.row(i).iter().enumerate() {
+            totals[k] += phi * phi;
+            for &(joint, weight) in weights.row(i) {
+                sums.row_mut(k)[joint as usize] += phi * phi * weight;
+            }
+        }
+    }
+    for (k, total) in totals.iter().enumerate().filter(|(_, total)| **total > 0.0) {
+        sums.row_mut(k).iter_mut().for_each(|w| *w /= total);
+    }
+    SkinWeights::from_blended(&sums)
+}

@@ -1,0 +1,103 @@
+//! Joint coordinates Ψ: how the cage moves the joints.
+//!
+//! Based on [CTL*20] §4.1, Eq. (9–12): ψ_j = MEC(Σ_i mvc_ji · L_ji · φ_i), where mvc_j are the mean
+//! value coordinates of joint j with respect to the skin, and the locality L_ji is high where bone
+//! j blends with others, that is around the joint. Cost: `#J · #M · #C`.
+//!
+//! Where the paper is silent: a bone without weights, or whose weights blend nowhere, has no
+//! locality. Its joint gets plain coordinates with respect to the cage, and is reported.
+
+use super::max_entropy::max_entropy_coordinates;
+use crate::cage::Cage;
+use crate::coordinates::mean_value::{coordinates, Scratch, Surface};
+use crate::points::Point;
+use crate::rows::Rows;
+use crate::weights::SkinWeights;
+use rayon::prelude::*;
+
+/// Ψ and what had to be done for it.
+#[derive(Debug, Clone)]
+pub struct JointCoordinates {
+    /// Ψ, `#J by #C`: rows sum to 1, Ψ C₀ = a₀.
+    pub coords: Rows,
+    /// Joints outside the convex hull of the cage: affine coordinates, some negative.
+    pub outside_hull: Vec<usize>,
+    /// Joints without locality: plain coordinates with respect to the cage.
+    pub without_locality: Vec<usize>,
+}
+
+/// The skin at rest as the joints see it.
+pub struct SkinAtRest<'a> {
+    /// M₀, `#M by 3`, rig space.
+    pub vertices: &'a [Point],
+    /// Its triangles; none means that distance to the joint does not count.
+    pub triangles: &'a [[u32; 3]],
+    /// Ω, `#M by #J`.
+    pub weights: &'a SkinWeights,
+    /// Φ, `#M by #C`.
+    pub cage_coords: &'a Rows,
+}
+
+/// Ψ of `joints` (`#J by 3`). `exponent` is s of Eq. (9).
+pub fn joint_coordinates(cage: &Cage, skin: &SkinAtRest, joints: &[Point], exponent: f64) -> JointCoordinates {
+    let surface = Surface::new(skin.vertices, skin.triangles);
+    let found: Vec<_> = (0..joints.len())
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, joint| {
+            let masses = masses(&surface, skin, joint, &joints[joint], exponent, scratch);
+            masses.map(|m| max_entropy_coordinates(cage.vertices(), &joints[joint], &m))
+        })
+        .collect();
+    let mut result = JointCoordinates {
+        coords: coordinates(cage, joints),
+        outside_hull: Vec::new(),
+        without_locality: Vec::new(),
+    };
+    for (joint, solved) in found.into_iter().enumerate() {
+        match solved {
+            Some(solved) => {
+                result.coords.row_mut(joint).copy_from_slice(&solved.coords);
+                if !solved.inside {
+                    result.outside_hull.push(joint);
+                }
+            }
+            None => result.without_locality.push(joint),
+        }
+    }
+    result
+}
+
+/// m = Σ_i mvc_ji · L_ji · φ_i, Eq. (10); `None` when bone `joint` has no locality.
+fn masses(
+    surface: &Surface,
+    skin: &SkinAtRest,
+    joint: usize,
+    place: &Point,
+    exponent: f64,
+    scratch: &mut Scratch,
+) -> Option<Vec<f64>> {
+    let locality = joint_locality(skin.weights, joint, exponent);
+    if locality.iter().all(|&(_, l)| l <= 1e-12) {
+        return None;
+    }
+    let mut shares = vec![1.0; skin.vertices.len()];
+    if !skin.triangles.is_empty() {
+        surface.weights(place, scratch, &mut shares);
+    }
+    let mut masses = vec![0.0; skin.cage_coords.columns()];
+    for (vertex, locality) in locality {
+        let factor = shares[vertex] * locality;
+        masses.iter_mut().zip(skin.cage_coords.row(vertex)).for_each(|(m, phi)| *m += factor * phi);
+    }
+    masses.iter().any(|m| m.is_finite() && *m > 0.0).then_some(masses)
+}
+
+/// L_ji = −1 + ω_ij^s + (Σ_{k≠j} ω_ik)^s, Eq. (9), for the vertices where it is not 0. A vertex
+/// without weights has none (the formula as printed would say −1).
+pub fn joint_locality(weights: &SkinWeights, joint: usize, exponent: f64) -> Vec<(usize, f64)> {
+    let own = |vertex: usize| weights.row(vertex).iter().find(|(j, _)| *j as usize == joint).map(|(_, w)| *w);
+    (0..weights.len())
+        .filter_map(|vertex| own(vertex).map(|w| (vertex, w)))
+        .map(|(vertex, w)| (vertex, -1.0 + w.powf(exponent) + (1.0 - w).max(0.0).powf(exponent)))
+        .collect()
+}

@@ -1,0 +1,357 @@
+//! [`CoupledRig`]: the only owner of the cycle between cage and skeleton.
+//!
+//! Six structures (rest and posed skin, skeleton, cage) and four edits. An edit changes the rest
+//! cage C, or what the animation says of the bones, or both; everything else follows:
+//!
+//! ```text
+//! rest changed ─► joints a = Ψ C (13)          always ─► transforms T (16–17)
+//!                 rest skin M = M₀ + Φ(C − C₀) (7)       posed skin M′ = F(T, Ω, M) (1–3)
+//!                                                        posed cage C′ (8)
+//! ```
+//!
+//! Joints and transforms follow at once. The three large arrays are remade when they are read, so
+//! that a frame pays for what it shows: `Stale` is the one place that knows which are due.
+
+pub mod bind;
+pub mod cage_reverser;
+pub mod cage_updater;
+pub mod joint_coordinates;
+pub mod max_entropy;
+pub mod maxvol;
+pub mod rest_skin;
+pub mod skeleton_updater;
+
+#[cfg(test)]
+mod naive;
+#[cfg(test)]
+mod tests;
+
+pub use bind::{BindInput, BindOptions, Binding, Known, Report};
+
+use crate::cage::Cage;
+use crate::error::{Error, PoseError, SkinError};
+use crate::points::{bounding_diagonal, first_not_finite, to_f32, Matrix3, Point, Transform};
+use crate::rows::Rows;
+use crate::skinning::SkinningInput;
+use cage_reverser::CageReverser;
+use skeleton_updater::JointMotion;
+
+/// A posed cage edit has arrived when it misses by this part of the size.
+const ARRIVED: f64 = 1e-12;
+/// An edit that ends farther away than this is refused.
+const REACHED: f64 = 1e-10;
+/// Solves an edit may take: one, and refinements where Eq. (19) is badly conditioned.
+const SOLVES: usize = 4;
+
+/// How often something expensive was done since the bind.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Factorisations of Φ̃ (one, at bind).
+    pub anchor_factorisations: usize,
+    /// Factorisations of Eq. (19).
+    pub reverse_factorisations: usize,
+    /// Solves with them.
+    pub reverse_solves: usize,
+    /// Products with Φ over the whole skin.
+    pub rest_passes: usize,
+    /// Skinnings of the whole skin.
+    pub skin_passes: usize,
+    /// Evaluations of Eq. (8).
+    pub cage_fits: usize,
+}
+
+/// Which of the large arrays are due.
+#[derive(Debug, Clone, Copy)]
+struct Stale {
+    rest_skin: bool,
+    posed_skin: bool,
+    posed_cage: bool,
+}
+
+/// A character bound to a cage and a skeleton. Rig space throughout.
+#[derive(Debug, Clone)]
+pub struct CoupledRig {
+    binding: Binding,
+    rest_cage: Vec<Point>,
+    motions: Vec<JointMotion>,
+    offsets: Option<Vec<[f32; 3]>>,
+    joints: Vec<Point>,
+    transforms: Vec<Transform>,
+    rest_skin: Vec<[f32; 3]>,
+    posed_skin: Vec<[f32; 3]>,
+    posed_cage: Vec<Point>,
+    stale: Stale,
+    reverser: Option<CageReverser>,
+    work: Work,
+}
+
+impl CoupledRig {
+    /// Binds: everything is precomputed here.
+    pub fn new(input: BindInput) -> Result<Self, Error> {
+        let binding = Binding::new(input)?;
+        let joints = binding.skeleton_updater.skeleton().joints().to_vec();
+        let rest = binding.rest_skin.at_bind().to_vec();
+        Ok(Self {
+            rest_cage: binding.cage.vertices().to_vec(),
+            motions: vec![JointMotion { linear: Matrix3::identity(), step: Point::zeros() }; joints.len()],
+            offsets: None,
+            transforms: vec![Transform::identity(); joints.len()],
+            joints,
+            posed_skin: rest.clone(),
+            rest_skin: rest,
+            posed_cage: binding.cage.vertices().to_vec(),
+            stale: Stale { rest_skin: false, posed_skin: false, posed_cage: false },
+            reverser: None,
+            work: Work { anchor_factorisations: 1, ..Work::default() },
+            binding,
+        })
+    }
+
+    /// The bones move: `transforms` (one per joint) as the animation measures them at
+    /// `rest_joints` (`#J by 3`; the joints of the bind if not given).
+    pub fn pose(&mut self, transforms: &[Transform], rest_joints: Option<&[Point]>) -> Result<(), PoseError> {
+        let motions = self.read_motions(transforms, rest_joints)?;
+        self.propagate(None, Some(motions));
+        Ok(())
+    }
+
+    /// The artist moves the rest cage to `cage` (`#C by 3`).
+    pub fn edit_rest_cage(&mut self, cage: &[Point]) -> Result<(), PoseError> {
+        self.check_cage(cage)?;
+        self.propagate(Some(cage), None);
+        Ok(())
+    }
+
+    /// The artist moves the posed cage to `wanted` (`#C by 3`): CageRev finds the rest cage that
+    /// is posed so, Eq. (19).
+    pub fn edit_posed_cage(&mut self, wanted: &[Point]) -> Result<(), PoseError> {
+        self.check_cage(wanted)?;
+        if self.posed_cage() == wanted {
+            return Ok(());
+        }
+        let cage = self.reverse(wanted)?;
+        self.propagate(Some(&cage), None);
+        // The artist's own numbers, which the fit repeats to rounding.
+        self.posed_cage.copy_from_slice(wanted);
+        self.stale.posed_cage = false;
+        Ok(())
+    }
+
+    /// Playback: rest cage and bones together, as [`Self::edit_rest_cage`] and [`Self::pose`].
+    pub fn play(
+        &mut self,
+        cage: &[Point],
+        transforms: &[Transform],
+        rest_joints: Option<&[Point]>,
+    ) -> Result<(), PoseError> {
+        self.check_cage(cage)?;
+        let motions = self.read_motions(transforms, rest_joints)?;
+        self.propagate(Some(cage), Some(motions));
+        Ok(())
+    }
+
+    /// Moves the visible skin at rest by `offsets` (`#M by 3`; shape keys of a face). Anchors and
+    /// cages do not see them.
+    pub fn offset_rest_skin(&mut self, offsets: Option<&[Point]>) -> Result<(), SkinError> {
+        if let Some(offsets) = offsets {
+            if offsets.len() != self.rest_skin.len() {
+                return Err(SkinError::OffsetCount { expected: self.rest_skin.len(), found: offsets.len() });
+            }
+            if let Some(row) = first_not_finite(offsets) {
+                return Err(SkinError::OffsetNotFinite { row });
+            }
+        }
+        let offsets = offsets.filter(|o| o.iter().any(|p| *p != Point::zeros())).map(to_f32);
+        if offsets != self.offsets {
+            self.offsets = offsets;
+            self.stale.rest_skin = true;
+            self.stale.posed_skin = true;
+        }
+        Ok(())
+    }
+
+    /// The only place that knows what follows from what. What is given and equal to what is there
+    /// changes nothing.
+    fn propagate(&mut self, cage: Option<&[Point]>, motions: Option<Vec<JointMotion>>) {
+        let cage = cage.filter(|cage| *cage != self.rest_cage.as_slice());
+        let motions = motions.filter(|motions| *motions != self.motions);
+        if cage.is_none() && motions.is_none() {
+            return;
+        }
+        if let Some(cage) = cage {
+            self.rest_cage.copy_from_slice(cage);
+            self.joints = self.binding.skeleton_updater.joints(cage);
+            self.stale.rest_skin = true;
+        }
+        if let Some(motions) = motions {
+            // Eq. (19) depends on the linear parts alone.
+            let turned = motions.iter().zip(&self.motions).any(|(new, old)| new.linear != old.linear);
+            self.reverser = self.reverser.take().filter(|_| !turned);
+            self.motions = motions;
+        }
+        self.transforms = self.binding.skeleton_updater.transforms(&self.motions, &self.joints);
+        self.stale.posed_skin = true;
+        self.stale.posed_cage = true;
+    }
+
+    /// The rest cage whose posed cage is `wanted`. Changes nothing but the kept factors.
+    fn reverse(&mut self, wanted: &[Point]) -> Result<Vec<Point>, PoseError> {
+        let reverser = match self.reverser.take() {
+            Some(reverser) => reverser,
+            None => {
+                self.work.reverse_factorisations += 1;
+                let linear: Vec<Matrix3> = self.motions.iter().map(|m| m.linear).collect();
+                CageReverser::new(&self.binding.cage_updater, &self.binding.skeleton_updater, &linear)?
+            }
+        };
+        let mut cage = self.rest_cage.clone();
+        let mut reached = self.posed_cage.clone();
+        let mut miss = f64::INFINITY;
+        for _ in 0..SOLVES {
+            let step: Vec<Point> = wanted.iter().zip(&reached).map(|(w, r)| w - r).collect();
+            let change = reverser.solve(&step);
+            let next: Vec<Point> = cage.iter().zip(&change).map(|(c, d)| c + d).collect();
+            let joints = self.binding.skeleton_updater.joints(&next);
+            let transforms = self.binding.skeleton_updater.transforms(&self.motions, &joints);
+            let posed = self.binding.cage_updater.posed_cage(&next, &transforms);
+            self.work.reverse_solves += 1;
+            self.work.cage_fits += 1;
+            let next_miss = largest_distance(&posed, wanted) / bounding_diagonal(self.binding.cage.vertices());
+            if !(next_miss < 0.5 * miss) {
+                break;
+            }
+            (cage, reached, miss) = (next, posed, next_miss);
+            if miss <= ARRIVED {
+                break;
+            }
+        }
+        self.reverser = Some(reverser);
+        if miss <= REACHED { Ok(cage) } else { Err(PoseError::Unreachable { miss }) }
+    }
+
+    fn check_cage(&self, cage: &[Point]) -> Result<(), PoseError> {
+        if cage.len() != self.rest_cage.len() {
+            return Err(PoseError::CageCount { expected: self.rest_cage.len(), found: cage.len() });
+        }
+        first_not_finite(cage).map_or(Ok(()), |vertex| Err(PoseError::CageNotFinite { vertex }))
+    }
+
+    fn read_motions(
+        &self,
+        transforms: &[Transform],
+        rest_joints: Option<&[Point]>,
+    ) -> Result<Vec<JointMotion>, PoseError> {
+        let skeleton = self.binding.skeleton_updater.skeleton();
+        let rest_joints = rest_joints.unwrap_or(skeleton.joints());
+        if transforms.len() != skeleton.len() {
+            return Err(PoseError::TransformCount { expected: skeleton.len(), found: transforms.len() });
+        }
+        if let Some(joint) = transforms.iter().position(|t| !t.is_finite()) {
+            return Err(PoseError::TransformNotFinite { joint });
+        }
+        if rest_joints.len() != skeleton.len() {
+            return Err(PoseError::JointCount { expected: skeleton.len(), found: rest_joints.len() });
+        }
+        if let Some(joint) = first_not_finite(rest_joints) {
+            return Err(PoseError::JointNotFinite { joint });
+        }
+        Ok(self.binding.skeleton_updater.motions(transforms, rest_joints))
+    }
+
+    /// Rest skin M, `#M by 3`.
+    pub fn rest_skin(&mut self) -> &[[f32; 3]] {
+        if self.stale.rest_skin {
+            self.binding.rest_skin.write(&self.rest_cage, self.offsets.as_deref(), &mut self.rest_skin);
+            self.work.rest_passes += 1;
+            self.stale.rest_skin = false;
+        }
+        &self.rest_skin
+    }
+
+    /// Posed skin M′, `#M by 3`.
+    pub fn posed_skin(&mut self) -> &[[f32; 3]] {
+        self.rest_skin();
+        if self.stale.posed_skin {
+            let weights = &self.binding.packed_weights;
+            let input = SkinningInput { transforms: &self.transforms, weights, rest_skin: &self.rest_skin };
+            (self.binding.method.pose)(&input, &mut self.posed_skin);
+            self.work.skin_passes += 1;
+            self.stale.posed_skin = false;
+        }
+        &self.posed_skin
+    }
+
+    /// Posed cage C′, `#C by 3`.
+    pub fn posed_cage(&mut self) -> &[Point] {
+        if self.stale.posed_cage {
+            self.posed_cage = self.binding.cage_updater.posed_cage(&self.rest_cage, &self.transforms);
+            self.work.cage_fits += 1;
+            self.stale.posed_cage = false;
+        }
+        &self.posed_cage
+    }
+
+    /// Rest cage C, `#C by 3`.
+    pub fn rest_cage(&self) -> &[Point] {
+        &self.rest_cage
+    }
+
+    /// Rest joints a, `#J by 3`.
+    pub fn joints(&self) -> &[Point] {
+        &self.joints
+    }
+
+    /// Transforms T′ of the refit skeleton, one per joint.
+    pub fn transforms(&self) -> &[Transform] {
+        &self.transforms
+    }
+
+    /// Posed joints T′_j(a_j), `#J by 3`.
+    pub fn posed_joints(&self) -> Vec<Point> {
+        self.transforms.iter().zip(&self.joints).map(|(t, a)| t.apply(a)).collect()
+    }
+
+    /// Φ, `#M by #C`.
+    pub fn cage_coords(&self) -> &Rows {
+        &self.binding.cage_coords
+    }
+
+    /// Ψ, `#J by #C`.
+    pub fn joint_coords(&self) -> &Rows {
+        self.binding.skeleton_updater.joint_coords()
+    }
+
+    /// Λ, `#M by #C`, where it is known.
+    pub fn center_coords(&self) -> Option<&Rows> {
+        self.binding.center_coords.as_ref()
+    }
+
+    /// Anchor skin vertices, min(`#M`, `#C`).
+    pub fn anchors(&self) -> &[usize] {
+        &self.binding.anchors
+    }
+
+    /// The cage of the bind.
+    pub fn cage(&self) -> &Cage {
+        &self.binding.cage
+    }
+
+    /// What the bind found.
+    pub fn report(&self) -> &Report {
+        &self.binding.report
+    }
+
+    /// Bounding-box diagonal of the skin at bind.
+    pub fn size(&self) -> f64 {
+        self.binding.size
+    }
+
+    /// What was done since the bind.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+}
+
+fn largest_distance(a: &[Point], b: &[Point]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, |most, d| if d > most || d.is_nan() { d } else { most })
+}

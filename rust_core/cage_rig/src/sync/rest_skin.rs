@@ -1,0 +1,73 @@
+//! The rest skin under an edited cage, in the frame's single precision.
+//!
+//! [CTL*20] Eq. (7), M = Φ C, in delta form: M = M₀ + Φ (C − C₀). Exact at rest whatever rounding
+//! is in Φ, and only the columns of cage vertices that moved cost anything: `#M` per moved vertex.
+
+use crate::points::{to_f32, Point};
+use crate::rows::Rows;
+use rayon::prelude::*;
+
+/// Rows worked on at once: three sums and a column piece stay in the first cache.
+const PANEL: usize = 1024;
+/// Below this many vertices one thread is faster than two.
+const PARALLEL_FROM: usize = 8192;
+
+/// M₀, C₀ and Φ, column by column.
+#[derive(Debug, Clone)]
+pub struct RestSkin {
+    skin: Vec<[f32; 3]>,
+    cage: Vec<Point>,
+    columns: Vec<f32>,
+}
+
+impl RestSkin {
+    /// Keeps `skin` (`#M by 3`) and `cage` (`#C by 3`) of the bind and `cage_coords`
+    /// (`#M by #C`).
+    pub fn new(skin: &[Point], cage: &[Point], cage_coords: &Rows) -> Self {
+        let count = skin.len();
+        let mut columns = vec![0.0; count * cage.len()];
+        columns.par_chunks_mut(count.max(1)).enumerate().for_each(|(k, column)| {
+            column.iter_mut().enumerate().for_each(|(i, x)| *x = cage_coords.row(i)[k] as f32);
+        });
+        Self { skin: to_f32(skin), cage: cage.to_vec(), columns }
+    }
+
+    /// M₀, `#M by 3`.
+    pub fn at_bind(&self) -> &[[f32; 3]] {
+        &self.skin
+    }
+
+    /// Writes M for `cage` (C, `#C by 3`); `offsets` (`#M by 3`, or none) are added.
+    pub fn write(&self, cage: &[Point], offsets: Option<&[[f32; 3]]>, rest: &mut [[f32; 3]]) {
+        let moved: Vec<(usize, [f32; 3])> = (0..cage.len())
+            .filter(|&k| cage[k] != self.cage[k])
+            .map(|k| (k, (cage[k] - self.cage[k]).map(|x| x as f32).into()))
+            .collect();
+        let panel = |(index, out): (usize, &mut [[f32; 3]])| self.write_panel(index * PANEL, &moved, offsets, out);
+        if rest.len() < PARALLEL_FROM {
+            rest.chunks_mut(PANEL).enumerate().for_each(panel);
+        } else {
+            rest.par_chunks_mut(PANEL).enumerate().for_each(panel);
+        }
+    }
+
+    fn write_panel(&self, first: usize, moved: &[(usize, [f32; 3])], offsets: Option<&[[f32; 3]]>, out: &mut [[f32; 3]]) {
+        let (mut x, mut y, mut z) = ([0.0f32; PANEL], [0.0f32; PANEL], [0.0f32; PANEL]);
+        for (k, [dx, dy, dz]) in moved {
+            let column = &self.columns[k * self.skin.len() + first..][..out.len()];
+            for (i, phi) in column.iter().enumerate() {
+                x[i] += phi * dx;
+                y[i] += phi * dy;
+                z[i] += phi * dz;
+            }
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            let [a, b, c] = self.skin[first + i];
+            *out = [a + x[i], b + y[i], c + z[i]];
+        }
+        if let Some(offsets) = offsets {
+            let pairs = out.iter_mut().zip(&offsets[first..]);
+            pairs.for_each(|(out, offset)| (0..3).for_each(|d| out[d] += offset[d]));
+        }
+    }
+}

@@ -1,0 +1,129 @@
+"""Coupled cages and skeletons: the core of Cage Rig.
+
+Arrays are float32 or float64 of any layout; indices are integers of any width. All coordinates
+are in rig space. Shapes are written (rows, columns): #M skin vertices, #C cage vertices,
+#J joints. Rows are what is moved, columns what moves it.
+"""
+
+from typing import Any, TypeAlias, TypedDict, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Doubles: TypeAlias = NDArray[np.float64]
+Faces: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike]
+"""(#F, 3) vertex indices, or a pair (corner indices, face sizes) for polygons."""
+Weights: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike, ArrayLike]
+"""(#M, #J), or a triple (indptr, indices, data)."""
+
+__version__: str
+
+class CageRigError(ValueError): ...
+class CageError(CageRigError): ...
+class SkinError(CageRigError): ...
+class WeightsError(CageRigError): ...
+class SkeletonError(CageRigError): ...
+class PoseError(CageRigError): ...
+class ArrayError(CageRigError): ...
+
+class CageCheck(TypedDict):
+    turned: bool
+    triangles: NDArray[np.int64]
+
+class Options(TypedDict, total=False):
+    max_anchor_ratio: float
+    max_anchor_swaps: int
+    locality_exponent: float
+    min_singular: float
+
+class Report(TypedDict):
+    cage_turned: bool
+    joints_outside_hull: list[int]
+    unweighted_joints: list[int]
+    unweighted_vertices: int
+    anchor_max_ratio: float
+    anchor_swaps: int
+    anchor_condition: float
+    regularised: int
+    joint_error_max: float
+    coordinate_error_max: float
+
+class Work(TypedDict):
+    anchor_factorisations: int
+    reverse_factorisations: int
+    reverse_solves: int
+    rest_passes: int
+    skin_passes: int
+    cage_fits: int
+
+@final
+class CoupledRig:
+    def __new__(
+        cls,
+        skin_vertices: ArrayLike,  # (#M, 3)
+        skin_faces: Faces,
+        skin_weights: Weights,  # normalised at bind; a row without weights is not moved by the skeleton
+        joints: ArrayLike,  # (#J, 3)
+        parents: ArrayLike,  # (#J,), -1 = root, any order
+        cage_vertices: ArrayLike,  # (#C, 3)
+        cage_faces: Faces,
+        *,
+        method: str = "lbs",
+        coordinates: str = "mean_value",
+        anchors: ArrayLike | None = None,  # (min(#M, #C),) skin vertices
+        cage_coords: ArrayLike | None = None,  # (#M, #C)
+        joint_coords: ArrayLike | None = None,  # (#J, #C)
+        center_coords: ArrayLike | None = None,  # (#M, #C)
+        options: Options | None = None,
+    ) -> CoupledRig: ...
+    def pose(
+        self,
+        transforms: ArrayLike,  # (#J, 4, 4), acting on columns
+        rest_joints: ArrayLike | None = None,  # (#J, 3), where the transforms were measured
+    ) -> None: ...
+    def edit_rest_cage(self, cage: ArrayLike) -> None: ...
+    def edit_posed_cage(self, cage: ArrayLike) -> None: ...
+    def play(
+        self,
+        cage: ArrayLike,  # (#C, 3)
+        transforms: ArrayLike,
+        rest_joints: ArrayLike | None = None,
+    ) -> None: ...
+    def offset_rest_skin(self, offsets: ArrayLike | None) -> None: ...
+    def posed_skin_into(self, out: NDArray[Any], start: int = 0) -> None: ...
+    def rest_skin_into(self, out: NDArray[Any], start: int = 0) -> None: ...
+    def posed_cage_into(self, out: NDArray[Any]) -> None: ...
+    @property
+    def rest_skin(self) -> Doubles: ...
+    @property
+    def posed_skin(self) -> Doubles: ...
+    @property
+    def rest_cage(self) -> Doubles: ...
+    @property
+    def posed_cage(self) -> Doubles: ...
+    @property
+    def joints(self) -> Doubles: ...
+    @property
+    def posed_joints(self) -> Doubles: ...
+    @property
+    def transforms(self) -> Doubles: ...
+    @property
+    def cage_coords(self) -> Doubles: ...
+    @property
+    def joint_coords(self) -> Doubles: ...
+    @property
+    def center_coords(self) -> Doubles | None: ...
+    @property
+    def anchors(self) -> NDArray[np.int64]: ...
+    @property
+    def size(self) -> float: ...
+    @property
+    def report(self) -> Report: ...
+    @property
+    def work(self) -> Work: ...
+    def _panic_for_tests(self) -> None: ...
+
+def mean_value_coordinates(points: ArrayLike, cage_vertices: ArrayLike, cage_faces: Faces) -> Doubles: ...
+def check_cage(cage_vertices: ArrayLike, cage_faces: Faces) -> CageCheck: ...
+def skinning_methods() -> list[str]: ...
+def coordinate_kinds() -> list[str]: ...

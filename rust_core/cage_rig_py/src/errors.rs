@@ -1,0 +1,87 @@
+//! Exceptions: one for each thing a user brings, all of them `ValueError`s.
+
+use cage_rig::Error;
+use pyo3::create_exception;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+create_exception!(
+    cage_rig_core,
+    CageRigError,
+    PyValueError,
+    "Something handed to the core is not usable."
+);
+create_exception!(
+    cage_rig_core,
+    CageError,
+    CageRigError,
+    "A mesh cannot serve as a cage."
+);
+create_exception!(
+    cage_rig_core,
+    SkinError,
+    CageRigError,
+    "A mesh cannot serve as a skin."
+);
+create_exception!(
+    cage_rig_core,
+    WeightsError,
+    CageRigError,
+    "Weights cannot bind a skin to joints."
+);
+create_exception!(
+    cage_rig_core,
+    SkeletonError,
+    CageRigError,
+    "Joints and parents are no skeleton."
+);
+create_exception!(
+    cage_rig_core,
+    PoseError,
+    CageRigError,
+    "An edit cannot be carried out; the rig is as it was."
+);
+create_exception!(
+    cage_rig_core,
+    ArrayError,
+    CageRigError,
+    "An argument has the wrong shape, type or values."
+);
+
+/// The exception for a fault of the core.
+pub(crate) fn raise(error: impl Into<Error>) -> PyErr {
+    let error = error.into();
+    let message = error.to_string();
+    match error {
+        Error::Cage(_) => CageError::new_err(message),
+        Error::Skin(_) => SkinError::new_err(message),
+        Error::Weights(_) => WeightsError::new_err(message),
+        Error::Skeleton(_) => SkeletonError::new_err(message),
+        Error::Pose(_) => PoseError::new_err(message),
+        Error::Size { .. } | Error::NotFinite { .. } => ArrayError::new_err(message),
+        Error::UnknownName { .. } | Error::Option { .. } => CageRigError::new_err(message),
+    }
+}
+
+/// `?` for the core's results.
+pub(crate) trait OrRaise<T> {
+    /// The value, or the exception.
+    fn or_raise(self) -> PyResult<T>;
+}
+
+impl<T, E: Into<Error>> OrRaise<T> for Result<T, E> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(raise)
+    }
+}
+
+pub(crate) fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("CageRigError", py.get_type::<CageRigError>())?;
+    module.add("CageError", py.get_type::<CageError>())?;
+    module.add("SkinError", py.get_type::<SkinError>())?;
+    module.add("WeightsError", py.get_type::<WeightsError>())?;
+    module.add("SkeletonError", py.get_type::<SkeletonError>())?;
+    module.add("PoseError", py.get_type::<PoseError>())?;
+    module.add("ArrayError", py.get_type::<ArrayError>())
+}

@@ -1,0 +1,18 @@
+//! `cage_rig_core`: the Python module. A thin wrapper of `cage_rig` with the same names: it checks
+//! arrays at the door, releases the GIL around work, and turns errors into exceptions.
+
+mod arrays;
+mod errors;
+mod functions;
+mod rig;
+
+use pyo3::prelude::*;
+
+/// Coupled cages and skeletons: the core of Cage Rig.
+#[pymodule]
+fn cage_rig_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<rig::CoupledRig>()?;
+    functions::add_to(module)?;
+    errors::add_to(module)
+}

@@ -1,0 +1,360 @@
+//! `CoupledRig` for Python. The rig lives behind a lock that a panic poisons: after one, every
+//! call is refused instead of working on what the panic left behind.
+
+use crate::arrays::{self, Out};
+use crate::errors::{CageRigError, OrRaise};
+use cage_rig::sync::{BindInput, BindOptions, Known};
+use cage_rig::{Cage, Point, Skeleton};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::Mutex;
+
+/// A character bound to a cage and a skeleton.
+#[pyclass(frozen, module = "cage_rig_core")]
+pub(crate) struct CoupledRig {
+    rig: Mutex<cage_rig::CoupledRig>,
+    joints: usize,
+    cage_vertices: usize,
+    skin_vertices: usize,
+}
+
+impl CoupledRig {
+    /// Runs `work` on the rig without the GIL.
+    fn with<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut cage_rig::CoupledRig) -> R + Send,
+    ) -> PyResult<R> {
+        py.detach(|| {
+            self.rig
+                .lock()
+                .map(|mut rig| work(&mut rig))
+                .map_err(|_| ())
+        })
+        .map_err(|()| {
+            CageRigError::new_err("an internal error has left this rig unusable; bind again")
+        })
+    }
+
+    fn cage(&self, cage: &Bound<'_, PyAny>) -> PyResult<Vec<Point>> {
+        arrays::points(cage, "cage", ("#C", Some(self.cage_vertices)))
+    }
+
+    fn rest_joints(&self, joints: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<Point>>> {
+        joints
+            .map(|joints| arrays::points(joints, "rest_joints", ("#J", Some(self.joints))))
+            .transpose()
+    }
+}
+
+#[pymethods]
+impl CoupledRig {
+    #[new]
+    #[pyo3(signature = (skin_vertices, skin_faces, skin_weights, joints, parents, cage_vertices, cage_faces, *,
+        method="lbs", coordinates="mean_value", anchors=None, cage_coords=None, joint_coords=None,
+        center_coords=None, options=None))]
+    #[allow(clippy::too_many_arguments)] // the public signature: keyword-only but for the three meshes
+    fn new(
+        py: Python<'_>,
+        skin_vertices: &Bound<'_, PyAny>,
+        skin_faces: &Bound<'_, PyAny>,
+        skin_weights: &Bound<'_, PyAny>,
+        joints: &Bound<'_, PyAny>,
+        parents: &Bound<'_, PyAny>,
+        cage_vertices: &Bound<'_, PyAny>,
+        cage_faces: &Bound<'_, PyAny>,
+        method: &str,
+        coordinates: &str,
+        anchors: Option<&Bound<'_, PyAny>>,
+        cage_coords: Option<&Bound<'_, PyAny>>,
+        joint_coords: Option<&Bound<'_, PyAny>>,
+        center_coords: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let skin = arrays::points(skin_vertices, "skin_vertices", ("#M", None))?;
+        let cage = arrays::points(cage_vertices, "cage_vertices", ("#C", None))?;
+        let joints = arrays::points(joints, "joints", ("#J", None))?;
+        let (m, c, j) = (
+            ("#M", Some(skin.len())),
+            ("#C", Some(cage.len())),
+            ("#J", Some(joints.len())),
+        );
+        let matrix = |value: Option<&Bound<'_, PyAny>>, name, shape| {
+            value
+                .map(|value| arrays::matrix(value, name, shape))
+                .transpose()
+        };
+        let known = Known {
+            anchors: anchors
+                .map(|anchors| arrays::integers(anchors, "anchors"))
+                .transpose()?,
+            cage_coords: matrix(cage_coords, "cage_coords", [m, c])?,
+            joint_coords: matrix(joint_coords, "joint_coords", [j, c])?,
+            center_coords: matrix(center_coords, "center_coords", [m, c])?,
+        };
+        let cage_faces = arrays::polygons(cage_faces, "cage_faces")?;
+        let parents = arrays::integers(parents, "parents")?;
+        let input = BindInput {
+            skin_weights: arrays::weights(skin_weights, skin.len(), joints.len())?,
+            skin_vertices: skin,
+            skin_faces: arrays::polygons(skin_faces, "skin_faces")?,
+            skeleton: Skeleton::new(joints, &parents).or_raise()?,
+            cage: py.detach(|| Cage::new(cage, &cage_faces)).or_raise()?,
+            method: cage_rig::skinning::method(method).or_raise()?,
+            coordinates: cage_rig::coordinates::kind(coordinates).or_raise()?,
+            known,
+            options: read_options(options)?,
+        };
+        let (skin_vertices, joints, cage_vertices) = (
+            input.skin_vertices.len(),
+            input.skeleton.len(),
+            input.cage.vertices().len(),
+        );
+        let rig = py.detach(|| cage_rig::CoupledRig::new(input)).or_raise()?;
+        Ok(Self {
+            rig: Mutex::new(rig),
+            joints,
+            cage_vertices,
+            skin_vertices,
+        })
+    }
+
+    /// The bones move: transforms (#J, 4, 4) measured at rest_joints (default: those of the bind).
+    #[pyo3(signature = (transforms, rest_joints=None))]
+    fn pose(
+        &self,
+        py: Python<'_>,
+        transforms: &Bound<'_, PyAny>,
+        rest_joints: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let transforms = arrays::transforms(transforms, self.joints)?;
+        let rest_joints = self.rest_joints(rest_joints)?;
+        self.with(py, |rig| rig.pose(&transforms, rest_joints.as_deref()))?
+            .or_raise()
+    }
+
+    /// The artist moves the rest cage to cage (#C, 3).
+    fn edit_rest_cage(&self, py: Python<'_>, cage: &Bound<'_, PyAny>) -> PyResult<()> {
+        let cage = self.cage(cage)?;
+        self.with(py, |rig| rig.edit_rest_cage(&cage))?.or_raise()
+    }
+
+    /// The artist moves the posed cage to cage (#C, 3): the rest cage follows.
+    fn edit_posed_cage(&self, py: Python<'_>, cage: &Bound<'_, PyAny>) -> PyResult<()> {
+        let cage = self.cage(cage)?;
+        self.with(py, |rig| rig.edit_posed_cage(&cage))?.or_raise()
+    }
+
+    /// Playback: rest cage and transforms together.
+    #[pyo3(signature = (cage, transforms, rest_joints=None))]
+    fn play(
+        &self,
+        py: Python<'_>,
+        cage: &Bound<'_, PyAny>,
+        transforms: &Bound<'_, PyAny>,
+        rest_joints: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let cage = self.cage(cage)?;
+        let transforms = arrays::transforms(transforms, self.joints)?;
+        let rest_joints = self.rest_joints(rest_joints)?;
+        self.with(py, |rig| {
+            rig.play(&cage, &transforms, rest_joints.as_deref())
+        })?
+        .or_raise()
+    }
+
+    /// Moves the visible skin at rest by offsets (#M, 3), or not at all (None).
+    #[pyo3(signature = (offsets))]
+    fn offset_rest_skin(&self, py: Python<'_>, offsets: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let rows = ("#M", Some(self.skin_vertices));
+        let offsets = offsets
+            .map(|offsets| arrays::points(offsets, "offsets", rows))
+            .transpose()?;
+        self.with(py, |rig| rig.offset_rest_skin(offsets.as_deref()))?
+            .or_raise()
+    }
+
+    /// Writes rows of the posed skin, from row start on, into out (n, 3) or flat.
+    #[pyo3(signature = (out, start=0))]
+    fn posed_skin_into(
+        &self,
+        py: Python<'_>,
+        out: &Bound<'_, PyAny>,
+        start: usize,
+    ) -> PyResult<()> {
+        let mut out = Out::new(out)?;
+        let view = out.view();
+        self.with(py, |rig| view.write(rig.posed_skin(), start))?
+    }
+
+    /// Writes rows of the rest skin, from row start on, into out (n, 3) or flat.
+    #[pyo3(signature = (out, start=0))]
+    fn rest_skin_into(&self, py: Python<'_>, out: &Bound<'_, PyAny>, start: usize) -> PyResult<()> {
+        let mut out = Out::new(out)?;
+        let view = out.view();
+        self.with(py, |rig| view.write(rig.rest_skin(), start))?
+    }
+
+    /// Writes the posed cage into out (#C, 3) or flat.
+    fn posed_cage_into(&self, py: Python<'_>, out: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut out = Out::new(out)?;
+        let view = out.view();
+        self.with(py, |rig| {
+            let cage: Vec<[f64; 3]> = rig.posed_cage().iter().map(|p| (*p).into()).collect();
+            view.write(&cage, 0)
+        })?
+    }
+
+    /// Rest skin (#M, 3), a copy.
+    #[getter]
+    fn rest_skin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_frame(py, &self.with(py, |rig| rig.rest_skin().to_vec())?)
+    }
+
+    /// Posed skin (#M, 3), a copy.
+    #[getter]
+    fn posed_skin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_frame(py, &self.with(py, |rig| rig.posed_skin().to_vec())?)
+    }
+
+    /// Rest cage (#C, 3), a copy.
+    #[getter]
+    fn rest_cage<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_points(py, &self.with(py, |rig| rig.rest_cage().to_vec())?)
+    }
+
+    /// Posed cage (#C, 3), a copy.
+    #[getter]
+    fn posed_cage<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_points(py, &self.with(py, |rig| rig.posed_cage().to_vec())?)
+    }
+
+    /// Rest joints (#J, 3), a copy.
+    #[getter]
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_points(py, &self.with(py, |rig| rig.joints().to_vec())?)
+    }
+
+    /// Posed joints (#J, 3), a copy.
+    #[getter]
+    fn posed_joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_points(py, &self.with(py, |rig| rig.posed_joints())?)
+    }
+
+    /// Transforms of the refit skeleton (#J, 4, 4), a copy.
+    #[getter]
+    fn transforms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let transforms = self.with(py, |rig| rig.transforms().to_vec())?;
+        let number = |k: usize| {
+            let (transform, row, column) = (&transforms[k / 16], k / 4 % 4, k % 4);
+            match (row, column) {
+                (3, _) => f64::from(u8::from(column == 3)),
+                (_, 3) => transform.translation[row],
+                _ => transform.linear[(row, column)],
+            }
+        };
+        let flat: Vec<f64> = (0..16 * transforms.len()).map(number).collect();
+        PyArray1::from_vec(py, flat).reshape([transforms.len(), 4, 4])
+    }
+
+    /// Cage coordinates (#M, #C), a copy.
+    #[getter]
+    fn cage_coords<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_rows(py, &self.with(py, |rig| rig.cage_coords().clone())?)
+    }
+
+    /// Joint coordinates (#J, #C), a copy.
+    #[getter]
+    fn joint_coords<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::from_rows(py, &self.with(py, |rig| rig.joint_coords().clone())?)
+    }
+
+    /// Center coordinates (#M, #C), a copy, or None.
+    #[getter]
+    fn center_coords<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let coords = self.with(py, |rig| rig.center_coords().cloned())?;
+        coords
+            .map(|coords| arrays::from_rows(py, &coords))
+            .transpose()
+    }
+
+    /// Anchor skin vertices.
+    #[getter]
+    fn anchors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let anchors = self.with(py, |rig| rig.anchors().iter().map(|&i| i as i64).collect())?;
+        Ok(PyArray1::from_vec(py, anchors))
+    }
+
+    /// Bounding-box diagonal of the skin at bind.
+    #[getter]
+    fn size(&self, py: Python<'_>) -> PyResult<f64> {
+        self.with(py, |rig| rig.size())
+    }
+
+    /// What the bind found and did.
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = self.with(py, |rig| rig.report().clone())?;
+        let report = PyDict::new(py);
+        report.set_item("cage_turned", found.cage_turned)?;
+        report.set_item("joints_outside_hull", found.joints_outside_hull)?;
+        report.set_item("unweighted_joints", found.unweighted_joints)?;
+        report.set_item("unweighted_vertices", found.unweighted_vertices)?;
+        report.set_item("anchor_max_ratio", found.anchor_max_ratio)?;
+        report.set_item("anchor_swaps", found.anchor_swaps)?;
+        report.set_item("anchor_condition", found.anchor_condition)?;
+        report.set_item("regularised", found.regularised)?;
+        report.set_item("joint_error_max", found.joint_error_max)?;
+        report.set_item("coordinate_error_max", found.coordinate_error_max)?;
+        Ok(report)
+    }
+
+    /// How often something expensive was done since the bind.
+    #[getter]
+    fn work<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let done = self.with(py, |rig| rig.work())?;
+        let work = PyDict::new(py);
+        work.set_item("anchor_factorisations", done.anchor_factorisations)?;
+        work.set_item("reverse_factorisations", done.reverse_factorisations)?;
+        work.set_item("reverse_solves", done.reverse_solves)?;
+        work.set_item("rest_passes", done.rest_passes)?;
+        work.set_item("skin_passes", done.skin_passes)?;
+        work.set_item("cage_fits", done.cage_fits)?;
+        Ok(work)
+    }
+
+    /// Panics while holding the rig: lets tests see that a panic stays an exception.
+    #[allow(clippy::panic)]
+    fn _panic_for_tests(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, |_| panic!("asked to by a test"))
+    }
+
+    fn __repr__(&self) -> String {
+        let Self {
+            skin_vertices,
+            joints,
+            cage_vertices,
+            ..
+        } = self;
+        format!("<CoupledRig: {skin_vertices} skin vertices, {joints} joints, {cage_vertices} cage vertices>")
+    }
+}
+
+fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOptions> {
+    let mut options = BindOptions::default();
+    for (key, value) in given.into_iter().flatten() {
+        match key.extract::<String>()?.as_str() {
+            "max_anchor_ratio" => options.maxvol.max_ratio = value.extract()?,
+            "max_anchor_swaps" => options.maxvol.max_swaps = value.extract()?,
+            "locality_exponent" => options.locality_exponent = value.extract()?,
+            "min_singular" => options.min_singular = value.extract()?,
+            unknown => {
+                return Err(CageRigError::new_err(format!(
+                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular"
+                )))
+            }
+        }
+    }
+    Ok(options)
+}
