@@ -1,0 +1,19 @@
+"""The biped: a stylised walker in two meshes (body and outfit), 47 bones, smooth weights, and its cage."""
+
+from __future__ import annotations
+
+from .biped_cage import biped_cage
+from .biped_shape import body_parts, outfit_parts
+from .biped_skeleton import biped_bones
+from .parts import Character, Part, Skin, join_parts
+from .skin_weights import part_weights
+
+
+def biped() -> Character:
+    """The whole character, about 24,000 vertices, 1.89 tall with its pompom, facing −Y, feet on z = 0."""
+    bones = biped_bones()
+
+    def skin(name: str, parts: list[Part]) -> Skin:
+        return join_parts(name, parts, [part_weights(part, bones) for part in parts])
+
+    return Character("Biped", [skin("Body", body_parts()), skin("Outfit", outfit_parts())], bones, biped_cage())

@@ -1,0 +1,146 @@
+"""The biped's cage: closed, 118 vertices, quads, mirror-symmetric; torso, head, arms, mittens, legs, feet, with a
+loop at each joint.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from .biped_skeleton import ELBOW, HAND_ALONG, HAND_BACK, HAND_FRONT, SHOULDER, WRIST, hand_point
+from .parts import Array, Cage
+
+# Rings of the trunk: height, half width, front y, back y, and how far the middle bulges beyond front and back.
+_TRUNK = {
+    "hip": (0.580, 0.235, -0.150, 0.165, 0.010),
+    "waist": (0.840, 0.235, -0.195, 0.200, 0.020),
+    "armpit": (0.968, 0.265, -0.200, 0.205, 0.030),
+    "shoulder": (1.300, 0.180, -0.150, 0.205, 0.040),
+    "jaw": (1.350, 0.205, -0.215, 0.190, 0.050),
+    "brow": (1.620, 0.285, -0.235, 0.235, 0.050),
+    "crown": (1.915, 0.150, -0.115, 0.165, 0.010),
+}
+_ORDER = list(_TRUNK)
+
+
+def biped_cage() -> Cage:
+    """The cage around both skins, faces outward."""
+    half = _Half()
+    trunk = [half.trunk_ring(*_TRUNK[name]) for name in _ORDER]
+    for low, high in pairwise(trunk):
+        half.join_trunk(low, high, gap=low is trunk[_ORDER.index("armpit")])
+    half.faces.append(trunk[-1])
+    _add_arm(half, trunk[_ORDER.index("armpit")], trunk[_ORDER.index("shoulder")])
+    _add_leg(half, trunk[0])
+    return half.mirrored()
+
+
+class _Half:
+    """The half x ≥ 0 of a cage under construction. Trunk rings run front middle, front, back, back middle."""
+
+    def __init__(self) -> None:
+        self.vertices: list[Array] = []
+        self.faces: list[list[int]] = []
+
+    def add(self, points: Array) -> list[int]:
+        start = len(self.vertices)
+        self.vertices.extend(np.asarray(points, float))
+        return list(range(start, start + len(points)))
+
+    def trunk_ring(self, z: float, x: float, front: float, back: float, bulge: float) -> list[int]:
+        return self.add([(0.0, front - bulge, z), (x, front, z), (x, back, z), (0.0, back + bulge, z)])
+
+    def join_trunk(self, low: list[int], high: list[int], *, gap: bool) -> None:
+        """Quads between two trunk rings; `gap` leaves the side open for the arm."""
+        for k in (0, 1, 2):
+            if not (gap and k == 1):
+                self.faces.append([low[k], low[k + 1], high[k + 1], high[k]])
+
+    def join_loop(self, first: list[int], second: list[int]) -> None:
+        """Quads between two closed rings that turn the same way, seen from the second."""
+        for k in range(len(first)):
+            n = (k + 1) % len(first)
+            self.faces.append([first[k], first[n], second[n], second[k]])
+
+    def mirrored(self) -> Cage:
+        """The whole cage: middle vertices shared, the others mirrored."""
+        points = np.array(self.vertices)
+        other = np.arange(len(points))
+        sided = points[:, 0] > 0.0
+        other[sided] = len(points) + np.arange(sided.sum())
+        vertices = np.concatenate([points, points[sided] * [-1.0, 1.0, 1.0]])
+        return Cage(vertices, self.faces + [[int(other[v]) for v in reversed(face)] for face in self.faces])
+
+
+def _add_arm(half: _Half, low: list[int], high: list[int]) -> None:
+    """Arm from the open side of the trunk: elbow (two loops), wrist, knuckles, fingertips."""
+    ring = [low[1], low[2], high[2], high[1]]
+    upper, lower = ELBOW - SHOULDER, WRIST - ELBOW
+    bend = upper / np.linalg.norm(upper) + lower / np.linalg.norm(lower)
+    sections = [
+        (ELBOW - 0.17 * upper, upper, 0.115, 0.122),
+        (ELBOW + 0.20 * lower, bend, 0.105, 0.108),
+        (hand_point(-0.012, 0.0), HAND_ALONG, 0.100, 0.094),
+    ]
+    for center, axis, deep, tall in sections:
+        ring = _next_loop(half, ring, _section(center, axis, deep=(deep, deep), tall=tall))
+    ring = _next_loop(half, ring, _hand_section(0.088, front=0.152, rear=0.092, back=0.056, palm=0.078))
+    ring = _next_loop(half, ring, _hand_section(0.224, front=0.092, rear=0.092, back=0.044, palm=0.086))
+    half.faces.append(ring)
+
+
+def _section(center: Array, axis: Array, *, deep: tuple[float, float], tall: float) -> Array:
+    """A rectangle across the arm: lower front, lower back, upper back, upper front."""
+    along = axis / np.linalg.norm(axis)
+    up = np.cross(along, [0.0, 1.0, 0.0])
+    up *= np.sign(up[2]) / np.linalg.norm(up)
+    front = np.array([0.0, -deep[0], 0.0])
+    rear = np.array([0.0, deep[1], 0.0])
+    return np.array(
+        [center + front - tall * up, center + rear - tall * up, center + rear + tall * up, center + front + tall * up]
+    )
+
+
+def _hand_section(along: float, *, front: float, rear: float, back: float, palm: float) -> Array:
+    origin = WRIST + along * HAND_ALONG
+    corners = [(front, -palm), (-rear, -palm), (-rear, back), (front, back)]
+    return np.array([origin + a * HAND_FRONT + b * HAND_BACK for a, b in corners])
+
+
+def _next_loop(half: _Half, ring: list[int], points: Array) -> list[int]:
+    new = half.add(points)
+    half.join_loop(ring, new)
+    return new
+
+
+def _add_leg(half: _Half, hip: list[int]) -> None:
+    """Leg below half of the lowest trunk ring: knee (two loops), ankle, and a foot with heel, toe top and toe sole."""
+    ring = [hip[0], hip[3], hip[2], hip[1]]
+    loops = [
+        (0.470, 0.006, 0.225, -0.118, 0.120),
+        (0.350, 0.008, 0.226, -0.118, 0.128),
+        (0.160, 0.012, 0.230, -0.112, 0.135),
+    ]
+    for z, inner, outer, front, back in loops:
+        ring = _next_loop(
+            half, ring, np.array([(inner, front, z), (inner, back, z), (outer, back, z), (outer, front, z)])
+        )
+    inner_front, inner_back, outer_back, outer_front = ring
+    heel_in, heel_out, toe_in, toe_out, sole_in, sole_out = half.add(
+        [
+            (0.014, 0.145, -0.024), (0.236, 0.145, -0.024),
+            (0.012, -0.238, 0.105), (0.242, -0.238, 0.105),
+            (0.012, -0.244, -0.024), (0.244, -0.244, -0.024),
+        ]
+    )  # fmt: skip
+    half.faces += [
+        [inner_back, outer_back, heel_out, heel_in],
+        [outer_front, inner_front, toe_in, toe_out],
+        [toe_out, toe_in, sole_in, sole_out],
+        [sole_out, sole_in, heel_in, heel_out],
+        [inner_front, inner_back, heel_in, sole_in],
+        [inner_front, sole_in, toe_in],
+        [outer_back, outer_front, sole_out, heel_out],
+        [outer_front, toe_out, sole_out],
+    ]
