@@ -22,6 +22,16 @@ def frame_change_post(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -
 
 
 @persistent
+def undo_pre(*_: object) -> None:
+    sync.restoring()
+
+
+@persistent
+def redo_pre(*_: object) -> None:
+    sync.restoring()
+
+
+@persistent
 def undo_post(*_: object) -> None:
     sync.restored()
 
@@ -37,7 +47,7 @@ def load_post(*_: object) -> None:
     sync.restored()
 
 
-HANDLERS = (depsgraph_update_post, frame_change_post, undo_post, redo_post, load_post)
+HANDLERS = (depsgraph_update_post, frame_change_post, undo_pre, undo_post, redo_pre, redo_post, load_post)
 
 
 def register() -> None:

@@ -225,7 +225,7 @@ def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound) 
         skin.snapshot = snapshot.write(f"{skin.object.name} Bind", part.points, part.faces, part.weights)
         skin.skin_to_rig = bound.skin_to_rig[index].T.tolist()
         _join(skin.object, cage)
-    settings.state, settings.message = "LIVE", ""
+    settings.state = "PAUSED"  # a rig until the first update makes it live
     sync.start(cage, context.evaluated_depsgraph_get())
 
 

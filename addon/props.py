@@ -38,6 +38,11 @@ PARTS = [
 ]
 
 
+def _tag(settings: CageRigSettings, _context: bpy.types.Context) -> None:
+    """A setting changed: let Blender update the rig."""
+    settings.id_data.update_tag()
+
+
 class CageRigJoint(bpy.types.PropertyGroup):
     """One bone of the armature as it was at bind. `name` is the bone's name (inherited)."""
 
@@ -79,6 +84,7 @@ class CageRigSettings(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
+        update=_tag,
         options={"ANIMATABLE", "LIBRARY_EDITABLE"},
         override=OVERRIDABLE,
     )

@@ -44,6 +44,7 @@ class _Running:
 
 _running: dict[int, _Running] = {}
 _busy = False
+_restoring = False
 
 
 def forget() -> None:
@@ -60,8 +61,9 @@ def drop(cage: bpy.types.Object) -> None:
 
 def edited(depsgraph: bpy.types.Depsgraph) -> None:
     """After an update of the viewport: sync the rigs that it touched."""
+    event = Event.RESTORED if _restoring else Event.EDIT
     for cage in registry.touched(depsgraph):
-        update(cage, depsgraph, Event.EDIT)
+        update(cage, depsgraph, event)
 
 
 def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
@@ -70,8 +72,16 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
         update(cage, depsgraph, Event.FRAME)
 
 
+def restoring() -> None:
+    """Before undo and redo: the updates that Blender sends meanwhile are no edits."""
+    global _restoring
+    _restoring = True
+
+
 def restored() -> None:
     """After undo, redo or load: read everything again."""
+    global _restoring
+    _restoring = False
     registry.forget()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for cage in registry.rigs():
@@ -163,28 +173,37 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     rest = _read_rest_cage(cage, depsgraph)
     if len(rest) != len(session.snapshot.cage):
         raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")
-    rest_changed = running.cage is None or not np.array_equal(rest, running.cage)
-    if rest_changed and running.cage_wanted is not None:
-        rest_changed = not np.allclose(rest, running.cage_wanted, rtol=0.0, atol=1e-6 * session.size)
-    posed_object = settings.posed_cage
-    posed = _read_posed_cage(posed_object)
+    rest_changed = not _is_known(running, rest)
+    posed = _read_posed_cage(settings.posed_cage)
     posed_changed = running.posed is None or not np.array_equal(posed, running.posed)
-    in_edit_mode = posed_object.data.is_editmode
-    is_edit = posed_changed and (
-        in_edit_mode if event is Event.RESTORED else event is Event.EDIT and not _rest_is_edited(cage, rest_changed)
-    )
-    if running.cage_wanted is not None and not rest_changed:
-        session.play(running.cage_wanted, transforms, rest_joints, influence)
-    else:
-        session.play(rest, transforms, rest_joints, influence)
+    is_edit = posed_changed and _posed_is_edit(cage, event, rest_changed)
+    if rest_changed:
         running.cage, running.cage_wanted = rest, None
+    known = running.cage if running.cage_wanted is None else running.cage_wanted
+    session.play(known, transforms, rest_joints, influence)
     running.posed = posed
     return _take_posed_edit(cage, running, posed) if is_edit else ""
 
 
-def _rest_is_edited(cage: bpy.types.Object, rest_changed: bool) -> bool:
-    """Whether, with both cages changed, the rest cage is the one in the artist's hands."""
-    return rest_changed and cage.data.is_editmode and bpy.context.view_layer.objects.active == cage
+def _is_known(running: _Running, rest: Points) -> bool:
+    """Whether the rest cage is the one of the last update, or the one that an edit of the posed cage wrote."""
+    if running.cage_wanted is not None:
+        return np.allclose(rest, running.cage_wanted, rtol=0.0, atol=1e-6 * running.session.size)
+    return running.cage is not None and np.array_equal(rest, running.cage)
+
+
+def _posed_is_edit(cage: bpy.types.Object, event: Event, rest_changed: bool) -> bool:
+    """Whether a changed posed cage is the artist's edit, and not what a pose, a key or an undo made of it.
+
+    In Edit Mode its edit mesh is the truth, undo included, unless the rest cage is the one in the artist's hands.
+    """
+    if event is Event.FRAME:
+        return False
+    if not cage.cage_rig.posed_cage.data.is_editmode:
+        return event is Event.EDIT and not rest_changed
+    if event is Event.RESTORED:
+        return True
+    return not (rest_changed and cage.data.is_editmode and bpy.context.view_layer.objects.active == cage)
 
 
 def _take_posed_edit(cage: bpy.types.Object, running: _Running, posed: Points) -> str:

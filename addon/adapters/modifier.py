@@ -146,7 +146,10 @@ def restore_suspended(obj: bpy.types.Object) -> None:
 
 
 def place(skin: bpy.types.Object, armature: bpy.types.Object) -> int:
-    """Where our modifier belongs in the skin's stack: at the armature's modifier, else before all others."""
+    """Where our modifier is in the skin's stack, or belongs: at the armature's modifier, else before all others."""
+    ours = find(skin)
+    if ours is not None:
+        return list(skin.modifiers).index(ours)
     for index, modifier in enumerate(skin.modifiers):
         if modifier.type == "ARMATURE" and modifier.object == armature:
             return index

@@ -1,0 +1,67 @@
+# make demo · test · lint · bench · fixtures · extension · test-matrix
+# Every target sets up what it needs in .venv; nothing but Python, a Rust toolchain and make is assumed.
+
+PYTHON ?= $(shell sh tools/find-python)
+VENV := .venv
+PY := $(VENV)/bin/python
+CORE_SOURCES := $(shell find rust_core -name '*.rs' -o -name '*.toml' -o -name '*.pyi') Cargo.toml Cargo.lock
+ADDON_SOURCES := $(shell find addon -name '*.py' -o -name '*.toml')
+DEMO_OUT ?= build/demo
+
+.PHONY: demo test test-rust test-python lint bench fixtures extension test-matrix test-window clean
+
+demo: $(VENV)/.extension
+	$(PY) tools/with_extension.py demo/demo.py --out $(DEMO_OUT) $(if $(QUICK),--quick) \
+		$(if $(RIG),--rig "$(RIG)") $(if $(CAGE),--cage "$(CAGE)")
+
+test: test-rust test-python
+
+test-rust:
+	cargo test --release --quiet --workspace --exclude cage_rig_py
+
+test-python: $(VENV)/.extension
+	$(PY) -m pytest
+
+lint: $(VENV)/.core
+	cargo fmt --all --check
+	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+bench: $(VENV)/.core
+	cargo bench --quiet -p cage_rig
+
+fixtures: $(VENV)/.blender
+	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures
+
+extension: $(VENV)/.extension
+
+test-matrix: $(VENV)/.extension
+	$(PY) tools/test_matrix.py
+
+test-window: $(VENV)/.extension
+	$(PY) tests/window/run.py
+
+$(VENV)/.dev: pyproject.toml
+	@test -n "$(PYTHON)" || { sh tools/find-python; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --upgrade pip
+	$(PY) -m pip install --quiet --group dev
+	touch $@
+
+$(VENV)/.blender: $(VENV)/.dev
+	$(PY) -m pip install --quiet --group blender
+	touch $@
+
+$(VENV)/.core: $(VENV)/.dev $(CORE_SOURCES)
+	$(PY) tools/build_core.py --out dist/wheels
+	$(PY) -m pip install --quiet --force-reinstall --no-deps dist/wheels/cage_rig_core-*.whl
+	touch $@
+
+$(VENV)/.extension: $(VENV)/.core $(VENV)/.blender $(ADDON_SOURCES) tools/build_extension.py
+	$(PY) tools/build_extension.py --wheels dist/wheels --out dist
+	touch $@
+
+clean:
+	rm -rf $(VENV) .venvs build dist target

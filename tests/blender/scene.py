@@ -1,0 +1,167 @@
+"""What the Blender tests share: characters in the scene, reading what Blender shows, editing as an artist does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import bmesh
+import bpy
+import numpy as np
+from blend_fixtures.bar import bar
+from blend_fixtures.build import RigObjects, build_character
+from mathutils import Vector
+from numpy.typing import NDArray
+
+Points = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A bound character."""
+
+    skins: list[bpy.types.Object]
+    armature: bpy.types.Object
+    cage: bpy.types.Object
+
+    @property
+    def skin(self) -> bpy.types.Object:
+        return self.skins[0]
+
+    @property
+    def settings(self) -> bpy.types.PropertyGroup:
+        return self.cage.cage_rig
+
+    @property
+    def posed(self) -> bpy.types.Object:
+        return self.settings.posed_cage
+
+    @property
+    def refit(self) -> bpy.types.Object:
+        return self.settings.refit_armature
+
+    @property
+    def size(self) -> float:
+        points = rest(self.skin)
+        return float(np.linalg.norm(points.max(0) - points.min(0)))
+
+
+def select(objects: Iterable[bpy.types.Object], active: bpy.types.Object | None) -> None:
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(False)
+    for obj in objects:
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = active
+
+
+def bind(objects: RigObjects) -> Rig:
+    """Bind as the artist does: select everything, the cage active, and call the operator."""
+    select(objects.all, objects.cage)
+    assert bpy.ops.cage_rig.bind() == {"FINISHED"}
+    return Rig(objects.skins, objects.armature, objects.cage)
+
+
+def build_bar() -> RigObjects:
+    """The bar, not bound, its cage without shape keys."""
+    return build_character(replace(bar(), shape_keys={}))
+
+
+def bound_bar() -> Rig:
+    return bind(build_bar())
+
+
+def update() -> None:
+    bpy.context.view_layer.update()
+
+
+def rest(obj: bpy.types.Object) -> Points:
+    """Base coordinates, `#V by 3`."""
+    points = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None = None) -> Points:
+    """Evaluated coordinates in the object's space, `#V by 3`."""
+    depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
+    mesh = obj.evaluated_get(depsgraph).data
+    points = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+@contextmanager
+def plain_blender(skin: bpy.types.Object) -> Iterator[None]:
+    """Our modifier off and the Armature modifier on: what Blender alone would show."""
+    ours, native = skin.modifiers["Cage Rig"], skin.modifiers["Armature"]
+    ours.show_viewport, native.show_viewport = False, True
+    update()
+    yield
+    ours.show_viewport, native.show_viewport = True, False
+    update()
+
+
+def native(skin: bpy.types.Object) -> Points:
+    """The skin as Blender's own Armature modifier poses it."""
+    with plain_blender(skin):
+        return shown(skin)
+
+
+def bend(rig: Rig, angle: float, bone: str = "upper") -> None:
+    pose_bone = rig.armature.pose.bones[bone]
+    pose_bone.rotation_mode = "XYZ"
+    pose_bone.rotation_euler = (0.0, 0.0, angle)
+    update()
+
+
+def set_mesh(obj: bpy.types.Object, points: Points) -> None:
+    """Move the vertices of a mesh in Object Mode, as a script does."""
+    obj.data.vertices.foreach_set("co", np.ascontiguousarray(points, np.float32).ravel())
+    obj.data.update()
+    update()
+
+
+def enter_edit_mode(*objects: bpy.types.Object) -> None:
+    select(objects, objects[0])
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def leave_edit_mode() -> None:
+    bpy.ops.object.mode_set(mode="OBJECT")
+    update()
+
+
+def edited(obj: bpy.types.Object) -> Points:
+    """Coordinates of the edit mesh."""
+    return np.array([vertex.co for vertex in bmesh.from_edit_mesh(obj.data).verts], np.float32)
+
+
+def drag(obj: bpy.types.Object, vertex: int, offset: tuple[float, float, float]) -> None:
+    """Move one vertex of the edit mesh, as one mouse move of a drag does."""
+    edit = bmesh.from_edit_mesh(obj.data)
+    edit.verts.ensure_lookup_table()
+    edit.verts[vertex].co += Vector(offset)
+    bmesh.update_edit_mesh(obj.data)
+    update()
+
+
+def fat_key(rig: Rig, factor: float = 1.6, value: float = 1.0) -> bpy.types.ShapeKey:
+    """A shape key of the rest cage that fattens it around its axis and stretches it."""
+    if rig.cage.data.shape_keys is None:
+        rig.cage.shape_key_add(name="Basis", from_mix=False)
+    key = rig.cage.shape_key_add(name="Fat", from_mix=False)
+    key.points.foreach_set("co", (rest(rig.cage) * np.float32([1.2, factor, factor])).ravel())
+    key.value = value
+    update()
+    return key
+
+
+def fresh(rig: Rig) -> list[Points]:
+    """The skins as a session made anew from the file computes them now."""
+    import bl_ext.user_default.cage_rig.sync as sync
+
+    sync.forget()
+    sync.restored()
+    update()
+    return [shown(skin) for skin in rig.skins]
