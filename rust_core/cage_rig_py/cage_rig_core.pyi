@@ -26,6 +26,9 @@ class SkeletonError(CageRigError): ...
 class PoseError(CageRigError): ...
 class ArrayError(CageRigError): ...
 
+class PanicException(BaseException):  # noqa: N818  (the name is pyo3's)
+    """A bug in the core stopped a call; the rig that raised it refuses further calls."""
+
 class CageCheck(TypedDict):
     turned: bool
     triangles: NDArray[np.int64]

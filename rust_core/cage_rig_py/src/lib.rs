@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn cage_rig_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("PanicException", module.py().get_type::<pyo3::panic::PanicException>())?;
     module.add_class::<rig::CoupledRig>()?;
     functions::add_to(module)?;
     errors::add_to(module)
