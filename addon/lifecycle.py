@@ -250,11 +250,7 @@ def _write_joints(cage: bpy.types.Object, bound: _Bound) -> None:
 
 
 def _make_posed_cage(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound) -> None:
-    """The posed cage: a mesh of the cage's faces in rig space, parented to the armature.
-
-    Its Armature constraint has no influence: it makes Blender evaluate every bone for the skins, which take the
-    posed cage as an input, even where the armature is hidden.
-    """
+    """The posed cage: a mesh of the cage's faces in rig space, parented to the armature."""
     settings = cage.cage_rig
     mesh = positions.new_mesh(f"{cage.name} Posed", bound.snapshot.cage, bound.snapshot.cage_faces)
     obj = settings.posed_cage
@@ -267,13 +263,7 @@ def _make_posed_cage(context: bpy.types.Context, cage: bpy.types.Object, bound: 
         mesh.name = old.name
         _remove_mesh(old)
     _attach(context, obj, cage, "POSED_CAGE")
-    for constraint in list(obj.constraints):
-        obj.constraints.remove(constraint)
-    constraint = obj.constraints.new("ARMATURE")
-    constraint.name, constraint.influence = "Cage Rig: evaluate every bone", 0.0
-    for name in bound.bone_names:
-        target = constraint.targets.new()
-        target.target, target.subtarget = settings.armature, name
+    armature.depend_on_bones(obj, settings.armature, bound.bone_names)
 
 
 def _make_refit_armature(context: bpy.types.Context, cage: bpy.types.Object) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,9 @@ def main() -> None:
     command += ["--manifest-path", str(ROOT / "rust_core/cage_rig_py/Cargo.toml")]
     if sys.platform == "linux":
         command += ["--zig", "--compatibility", "manylinux_2_28"]
-    subprocess.run(command, check=True)
+    # maturin looks for zig (the ziglang package) through the python3 on PATH
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    subprocess.run(command, check=True, env={**os.environ, "PATH": path})
     for wheel in args.out.glob("cage_rig_core-*.whl"):
         print(f"{wheel}  {wheel.stat().st_size / 1e6:.2f} MB")
 

@@ -42,6 +42,13 @@ def stage(wheel: Path, platform: str, folder: Path) -> None:
         manifest.write(f'\nplatforms = ["{platform}"]\nwheels = ["./wheels/{wheel.name}"]\n')
 
 
+def run_builder(builder: Path, *arguments: str) -> None:
+    """Call Blender's builder; show what it says only where it fails."""
+    done = subprocess.run([sys.executable, str(builder), *arguments], capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"build_extension: {' '.join(arguments)} failed\n{done.stdout}{done.stderr}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--wheels", type=Path, required=True)
@@ -57,13 +64,8 @@ def main() -> None:
         folder = ROOT / "build" / f"extension-{PLATFORMS[tag]}"
         stage(wheel, PLATFORMS[tag], folder)
         target = args.out / f"cage_rig-{PLATFORMS[tag]}.zip"
-        run = [sys.executable, str(builder)]
-        subprocess.run(
-            [*run, "build", "--source-dir", str(folder), "--output-filepath", str(target)],
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
-        subprocess.run([*run, "validate", str(target)], check=True, stdout=subprocess.DEVNULL)
+        run_builder(builder, "build", "--source-dir", str(folder), "--output-filepath", str(target))
+        run_builder(builder, "validate", str(target))
         if f"wheels/{wheel.name}" not in zipfile.ZipFile(target).namelist():
             sys.exit(f"build_extension: {target} does not hold its wheel")
         print(f"{target}  {target.stat().st_size / 1e6:.2f} MB, validated")

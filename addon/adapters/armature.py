@@ -71,6 +71,8 @@ def new_refit_armature(name: str, source: bpy.types.Armature) -> bpy.types.Armat
     armature.name = name
     armature.animation_data_clear()
     armature.display_type = "STICK"
+    for bone in armature.bones:
+        bone.color.palette = "THEME04"
     return armature
 
 
@@ -95,6 +97,22 @@ def free_bones(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     for other in selected:
         other.select_set(True)
     view_layer.objects.active = active
+
+
+def depend_on_bones(obj: bpy.types.Object, armature_object: bpy.types.Object, names: list[str]) -> None:
+    """Make Blender evaluate these bones wherever it evaluates `obj`, even where the armature is hidden.
+
+    Blender evaluates the bones of a hidden armature only for what depends on each of them. A driver that reads every
+    bone and always gives 0 is such a dependency; unlike a constraint it draws no relationship lines.
+    """
+    obj.driver_remove("delta_location", 0)
+    driver = obj.driver_add("delta_location", 0).driver
+    driver.type, driver.expression = "SCRIPTED", "0.0"
+    for name in names:
+        variable = driver.variables.new()
+        variable.type = "TRANSFORMS"
+        target = variable.targets[0]
+        target.id, target.bone_target = armature_object, name
 
 
 def write_refit_pose(obj: bpy.types.Object, rest: Matrices, posed: Matrices) -> None:

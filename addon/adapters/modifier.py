@@ -3,7 +3,7 @@
 
 The feed is a FLOAT_VECTOR point attribute, one per rig, that the modifier's Set Position reads: base coordinates
 are never written. The modifier also takes the rest cage and the posed cage as object inputs, which is what makes
-Blender evaluate them (and, through a constraint on the posed cage, every bone) when they are hidden.
+Blender evaluate them (and, through a driver on the posed cage, every bone) when they are hidden.
 """
 
 from __future__ import annotations
