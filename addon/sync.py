@@ -39,6 +39,7 @@ class _Running:
     cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
     posed: Points | None = None  # posed cage as last read or written
     refit_rest: Matrix | None = None
+    bone_inverse: tuple[bytes, Matrix] | None = None  # rest matrices and their inverses
     written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
 
 
@@ -168,7 +169,7 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
     session, settings = running.session, cage.cage_rig
     session.offset_skins(_skin_offsets(cage, running, depsgraph))
-    transforms, rest_joints = _read_pose(cage, depsgraph)
+    transforms, rest_joints = _read_pose(cage, running, depsgraph)
     influence = float(cage.evaluated_get(depsgraph).cage_rig.influence)
     rest = _read_rest_cage(cage, depsgraph)
     if len(rest) != len(session.snapshot.cage):
@@ -254,15 +255,17 @@ def _read_posed_cage(posed: bpy.types.Object) -> Points:
     return positions.read_edit_mesh(posed.data) if posed.data.is_editmode else positions.read_base(posed.data)
 
 
-def _read_pose(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, Matrix]:
+def _read_pose(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, Matrix]:
     """Transforms T (`#J by 4 by 4`) of the evaluated pose, and the rest joints (`#J by 3`) they are measured at."""
     obj = cage.cage_rig.armature.evaluated_get(depsgraph)
     rest_order, pose_order = health.bone_order(cage)
     rest = armature.read_rest_matrices(obj.data)[rest_order]
     posed = armature.read_pose_matrices(obj)[pose_order]
-    same = np.isclose(posed, rest, rtol=0.0, atol=1e-7).all(axis=(1, 2))
-    transforms = posed @ np.linalg.inv(rest)
-    transforms[same] = np.eye(4)
+    key = rest.tobytes()
+    if running.bone_inverse is None or running.bone_inverse[0] != key:
+        running.bone_inverse = key, np.linalg.inv(rest)
+    transforms = posed @ running.bone_inverse[1]
+    transforms[(np.abs(posed - rest) <= 1e-7).all(axis=(1, 2))] = np.eye(4)
     return transforms, rest[:, :3, 3].copy()
 
 

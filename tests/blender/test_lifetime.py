@@ -180,6 +180,15 @@ def test_renamed_bones_and_objects_are_followed(bar: Rig) -> None:
     assert np.abs(shown(bar.skin) - native(bar.skin)).max() < 1e-5 * bar.size
 
 
+def test_renamed_bones_still_drive_when_hidden(bar: Rig) -> None:
+    bar.armature.data.bones["upper"].name = "forearm"
+    bar.armature.hide_viewport = bar.cage.hide_viewport = bar.posed.hide_viewport = bar.refit.hide_viewport = True
+    update()
+    before = shown(bar.skin).copy()
+    bend(bar, 1.0, "forearm")
+    assert np.abs(shown(bar.skin) - before).max() > 0.1
+
+
 def edit_bones(rig: Rig, change: object) -> None:
     select([rig.armature], rig.armature)
     bpy.ops.object.mode_set(mode="EDIT")

@@ -1,0 +1,172 @@
+"""The session, without Blender: `addon/session.py` knows no bpy and runs anywhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from blend_fixtures.bar import bar
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+@pytest.fixture(scope="module")
+def session() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("cage_rig_session", ROOT / "addon/session.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def faces_of(rows: object) -> tuple[np.ndarray, np.ndarray]:
+    rows = [list(row) for row in rows]
+    return np.concatenate(rows).astype(np.int32), np.array([len(row) for row in rows], np.int32)
+
+
+def csr(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    row, column = np.nonzero(weights)
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(weights)))])
+    return indptr, column, weights[row, column].astype(np.float32).astype(np.float64)
+
+
+@pytest.fixture
+def snapshot(session: ModuleType) -> object:
+    character = bar()
+    skin, cage, bones = character.skins[0], character.cage, character.bones
+    part = session.SkinSnapshot(np.float32(skin.vertices), faces_of(skin.faces), csr(skin.weights))
+    second = session.SkinSnapshot(np.float32(skin.vertices * 0.9), faces_of(skin.faces), csr(skin.weights))
+    return session.Snapshot(
+        [part, second],
+        np.array([bone.head for bone in bones], float),
+        np.array([bone.tail for bone in bones], float),
+        np.array([-1, 0], np.int32),
+        np.float32(cage.vertices),
+        faces_of(cage.faces),
+        "lbs",
+    )
+
+
+@pytest.fixture
+def live(session: ModuleType, snapshot: object) -> object:
+    return session.Session(snapshot)
+
+
+def bend(snapshot: object, angle: float) -> np.ndarray:
+    """Transforms of the bar with its second bone turned about z at its head."""
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    turn[:3, 3] = snapshot.heads[1] - turn[:3, :3] @ snapshot.heads[1]
+    return np.stack([np.eye(4), turn])
+
+
+def test_rest_is_rest(live: object, snapshot: object) -> None:
+    live.play(snapshot.cage, bend(snapshot, 0.0), snapshot.heads)
+    for k, skin in enumerate(snapshot.skins):
+        assert np.abs(live.posed_skin(k) - skin.points).max() < 1e-6
+    assert np.abs(live.posed_cage() - snapshot.cage).max() < 1e-6
+
+
+def test_two_skins_are_posed_like_one_each(live: object, session: ModuleType, snapshot: object) -> None:
+    transforms = bend(snapshot, 1.0)
+    live.play(snapshot.cage, transforms, snapshot.heads)
+    for k, skin in enumerate(snapshot.skins):
+        indptr, columns, values = skin.weights
+        dense = np.zeros((len(skin.points), 2))
+        dense[np.repeat(np.arange(len(dense)), np.diff(indptr)), columns] = values
+        dense /= dense.sum(1, keepdims=True)
+        points = np.c_[skin.points, np.ones(len(dense))]
+        wanted = np.einsum("mj,jrc,mc->mr", dense, transforms[:, :3], points)
+        assert np.abs(live.posed_skin(k) - wanted).max() < 2e-6 * live.size
+
+
+def test_the_same_input_does_no_work(live: object, snapshot: object) -> None:
+    transforms = bend(snapshot, 1.0)
+    live.play(snapshot.cage, transforms, snapshot.heads)
+    live.posed_skin(0), live.posed_cage()
+    before, work = live.revision, dict(live.rig.work)
+    for _ in range(3):
+        live.play(snapshot.cage.copy(), transforms.copy(), snapshot.heads.copy())
+        live.offset_skins([None, None])
+    assert live.revision == before and dict(live.rig.work) == work
+
+
+def test_posed_edit_lands(live: object, snapshot: object) -> None:
+    live.play(snapshot.cage, bend(snapshot, 1.2), snapshot.heads)
+    wanted = live.posed_cage().copy()
+    wanted[9] += (0.1, 0.2, 0.0)
+    live.edit_posed_cage(wanted)
+    assert np.abs(live.posed_cage() - wanted).max() < 1e-6
+
+
+def test_influence_scales_the_cage_and_a_posed_edit_still_lands(live: object, snapshot: object) -> None:
+    fat = snapshot.cage * np.float32([1.0, 1.5, 1.5])
+    transforms = bend(snapshot, 0.7)
+    live.play(snapshot.cage + (fat - snapshot.cage) * np.float32(0.5), transforms, snapshot.heads)
+    half = live.posed_skin(0).copy()
+    live.play(fat, transforms, snapshot.heads, 0.5)
+    assert np.abs(live.posed_skin(0) - half).max() < 1e-6
+    wanted = live.posed_cage().copy()
+    wanted[9] += (0.1, 0.2, 0.0)
+    cage = live.edit_posed_cage(wanted)
+    live.play(np.float32(cage), transforms, snapshot.heads, 0.5)
+    assert np.abs(live.posed_cage() - wanted).max() < 2e-6
+
+
+def test_no_influence_refuses_a_posed_edit(live: object, session: ModuleType, snapshot: object) -> None:
+    live.play(snapshot.cage, bend(snapshot, 0.7), snapshot.heads, 0.0)
+    with pytest.raises(session.SessionError, match="influence is 0"):
+        live.edit_posed_cage(live.posed_cage() + 0.1)
+
+
+def test_offsets_move_the_visible_skin_only(live: object, snapshot: object) -> None:
+    live.play(snapshot.cage, bend(snapshot, 0.0), snapshot.heads)
+    posed = live.posed_cage().copy()
+    offset = np.zeros_like(snapshot.skins[0].points)
+    offset[:10, 2] = 0.25
+    live.offset_skins([offset, None])
+    assert np.abs(live.posed_skin(0) - snapshot.skins[0].points - offset).max() < 1e-6
+    assert np.abs(live.posed_skin(1) - snapshot.skins[1].points).max() < 1e-6
+    assert np.array_equal(live.posed_cage(), posed)
+
+
+def test_refit_bones_reach_their_children(live: object, snapshot: object) -> None:
+    stretched = snapshot.cage * np.float32([1.5, 1, 1])
+    live.play(stretched, bend(snapshot, 0.0), snapshot.heads)
+    rest = np.stack([np.array([[0, -1, 0, x], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], float) for x in (-1, 0)])
+    rest[:, :3, :3] = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]], float)  # bones along x
+    posed = live.refit_pose(rest)
+    assert np.allclose(posed[:, :3, 3], [[-1.5, 0, 0], [0, 0, 0]], atol=1e-6)
+    assert np.allclose(posed[0] @ [0, 1.0, 0, 1], [0, 0, 0, 1], atol=1e-6)
+
+
+def test_a_refusal_of_the_core_is_a_session_error(session: ModuleType, snapshot: object) -> None:
+    broken = session.Snapshot(**{**vars(snapshot), "cage": snapshot.cage * np.float32(np.nan)})
+    with pytest.raises(session.SessionError, match="cage"):
+        session.Session(broken)
+
+
+def test_a_refused_input_leaves_the_session_as_it_was(live: object, session: ModuleType, snapshot: object) -> None:
+    live.play(snapshot.cage, bend(snapshot, 1.0), snapshot.heads)
+    before = live.posed_skin(0).copy()
+    spoiled = bend(snapshot, 0.5)
+    spoiled[1, 0, 0] = np.inf
+    with pytest.raises(session.SessionError):
+        live.play(snapshot.cage, spoiled, snapshot.heads)
+    assert np.array_equal(live.posed_skin(0), before)
+
+
+def test_a_panic_of_the_core_is_a_session_crash(
+    live: object, session: ModuleType, snapshot: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Panicking:
+        def play(self, *_: object) -> None:
+            raise session.cage_rig_core.PanicException("index out of bounds")
+
+    monkeypatch.setattr(live, "rig", Panicking())
+    with pytest.raises(session.SessionCrash, match="index out of bounds"):
+        live.play(snapshot.cage, bend(snapshot, 1.0), snapshot.heads)

@@ -1,0 +1,100 @@
+"""Who may import whom. ARCHITECTURE.md draws it; this test keeps it true."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ADDON = ROOT / "addon"
+CORE = ROOT / "rust_core/cage_rig/src"
+
+# What a module of the add-on may import: packages from outside, and modules of ours.
+ALLOWED: dict[str, tuple[set[str], set[str]]] = {
+    "compat": ({"bpy"}, set()),
+    "props": ({"bpy"}, set()),
+    "session": ({"cage_rig_core", "numpy"}, set()),
+    "adapters": ({"bpy", "bmesh", "mathutils", "numpy"}, {"adapters", "compat"}),
+    "registry": ({"bpy"}, {"adapters"}),
+    "health": ({"bpy", "numpy"}, {"adapters"}),
+    "sync": ({"bpy", "numpy"}, {"adapters", "health", "registry", "session"}),
+    "lifecycle": ({"bpy", "numpy"}, {"adapters", "props", "session", "sync"}),
+    "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
+    "handlers": ({"bpy"}, {"sync"}),
+    "operators": ({"bpy"}, {"lifecycle", "operators", "props", "selection"}),
+    "ui": ({"bpy"}, {"props", "ui"}),
+    "__init__": (set(), {"handlers", "operators", "props", "ui"}),
+}
+STANDARD = {"__future__", "atexit", "collections", "contextlib", "dataclasses", "enum", "functools", "itertools"}
+STANDARD |= {"textwrap", "typing"}
+
+
+def layer_of(path: Path) -> str:
+    return path.relative_to(ADDON).parts[0].removesuffix(".py")
+
+
+def imports(path: Path) -> tuple[set[str], set[str], list[int]]:
+    """(packages from outside, our modules, lines of imports inside functions) of one file."""
+    tree = ast.parse(path.read_text())
+    outside: set[str] = set()
+    ours: set[str] = set()
+    package = list(path.relative_to(ADDON).parts[:-1])
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            outside |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            outside.add((node.module or "").split(".")[0])
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1]
+            if base:
+                ours.add(base[0])
+            elif node.module:
+                ours.add(node.module.split(".")[0])
+            else:
+                ours |= {alias.name for alias in node.names}
+    nested = [
+        inner.lineno
+        for outer in ast.walk(tree)
+        if isinstance(outer, ast.FunctionDef)
+        for inner in ast.walk(outer)
+        if isinstance(inner, ast.Import | ast.ImportFrom)
+    ]
+    return outside - STANDARD, ours, nested
+
+
+@pytest.mark.parametrize("path", sorted(ADDON.rglob("*.py")), ids=lambda p: str(p.relative_to(ADDON)))
+def test_the_add_on_imports_only_what_its_layer_may(path: Path) -> None:
+    outside, ours, nested = imports(path)
+    allowed_outside, allowed_ours = ALLOWED[layer_of(path)]
+    assert outside <= allowed_outside
+    assert ours <= allowed_ours
+    assert not nested, f"imports inside functions at lines {nested}"
+
+
+def uses(folder: str) -> dict[Path, set[str]]:
+    """Which top-level modules of the core each file of one of its folders names."""
+    pattern = re.compile(r"\bcrate::(\w+)")
+    return {path: set(pattern.findall(path.read_text())) for path in (CORE / folder).rglob("*.rs")}
+
+
+def test_coordinates_and_skinning_know_nothing_above_them() -> None:
+    for folder, other in (("coordinates", "skinning"), ("skinning", "coordinates")):
+        assert uses(folder)
+        for path, named in uses(folder).items():
+            assert not named & {other, "sync", "caging"}, path
+
+
+def test_only_linalg_names_faer() -> None:
+    named = [path.name for path in CORE.rglob("*.rs") if re.search(r"\bfaer\b\s*(::|;)", path.read_text())]
+    assert named == ["linalg.rs"]
+
+
+def test_the_core_knows_no_python_and_no_files() -> None:
+    manifest = tomllib.loads((CORE.parent / "Cargo.toml").read_text())
+    assert not {"pyo3", "numpy"} & set(manifest["dependencies"])
+    for path in CORE.rglob("*.rs"):
+        assert not re.search(r"std::(fs|io|env|process)\b", path.read_text()), path
