@@ -27,7 +27,7 @@ lint: $(VENV)/.core
 	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
-	$(VENV)/bin/mypy
+	cd addon && ../$(VENV)/bin/mypy --config-file ../pyproject.toml session.py
 
 bench: $(VENV)/.core
 	cargo bench --quiet -p cage_rig

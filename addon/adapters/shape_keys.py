@@ -88,7 +88,9 @@ def offsets(obj: bpy.types.Object, keys: bpy.types.Key, count: int) -> Points | 
         return None
     total: Points | None = None
     for index, block in enumerate(keys.key_blocks):
-        value = float(index == obj.active_shape_key_index) if obj.show_only_shape_key else block.value * (not block.mute)
+        value = (
+            float(index == obj.active_shape_key_index) if obj.show_only_shape_key else block.value * (not block.mute)
+        )
         if index == 0 or value == 0.0 or len(block.points) != count:
             continue
         delta = (read_key(block, count) - read_key(block.relative_key, count)) * np.float32(value)

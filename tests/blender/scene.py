@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import bmesh
 import bpy
 import numpy as np
-from blend_fixtures.bar import bar
-from blend_fixtures.build import RigObjects, build_character
 from mathutils import Vector
 from numpy.typing import NDArray
+
+from blend_fixtures.bar import bar
+from blend_fixtures.build import RigObjects, build_character
 
 Points = NDArray[np.float32]
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from blend_fixtures.build import RigObjects
 from mathutils import Euler, Matrix, Vector
 from scene import Rig, bend, bind, bound_bar, build_bar, fat_key, native, rest, select, set_mesh, shown, update
+
+from blend_fixtures.build import RigObjects
 
 
 def file_state() -> dict[str, object]:

@@ -321,3 +321,36 @@ def test_disable_and_enable_again(bar: Rig) -> None:
     assert np.abs(shown(bar.skin) - before).max() < 1e-6
     bend(bar, 0.2)
     assert np.abs(shown(bar.skin) - before).max() > 0.05
+
+
+def test_a_panic_of_the_core_pauses_and_rebind_starts_anew(bar: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    import bl_ext.user_default.cage_rig.sync as sync
+    import cage_rig_core
+
+    class Panicking:
+        def play(self, *_: object) -> None:
+            raise cage_rig_core.PanicException("index out of bounds")
+
+        offset_rest_skin = play
+
+    monkeypatch.setattr(sync._running[bar.cage.session_uid].session, "rig", Panicking())
+    bend(bar, 1.0)
+    assert_paused_and_plain(bar, "index out of bounds")
+    select([bar.cage], bar.cage)
+    bpy.ops.cage_rig.rebind()
+    assert bar.settings.state == "LIVE"
+
+
+def test_an_unforeseen_error_pauses_and_never_raises(bar: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    import bl_ext.user_default.cage_rig.sync as sync
+
+    def fail(*_: object) -> None:
+        raise KeyError("whatever")
+
+    monkeypatch.setattr(sync, "_advance", fail)
+    bend(bar, 1.0)
+    assert_paused_and_plain(bar, "please report")
+    monkeypatch.undo()
+    bend(bar, 0.5)
+    assert bar.settings.state == "LIVE"
+    assert np.abs(shown(bar.skin) - native(bar.skin)).max() < 1e-5 * bar.size

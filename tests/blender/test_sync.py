@@ -331,6 +331,27 @@ def test_alembic_holds_the_live_frames(bar: Rig, hidden: bool, tmp_path: Path) -
         assert np.abs(back - points).max() < 1e-5, f"Alembic at frame {frame}"
 
 
+@pytest.mark.parametrize("hidden", [False, True])
+def test_usd_holds_the_live_frames(bar: Rig, hidden: bool, tmp_path: Path) -> None:
+    key_the_bar(bar)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 9
+    truth = {}
+    for frame in (1, 5, 9):
+        scene.frame_set(frame)
+        truth[frame] = shown(bar.skin).copy()
+    if hidden:
+        hide_in_viewport(bar)
+    target = tmp_path / "bar.usdc"
+    bpy.ops.wm.usd_export(filepath=str(target), export_animation=True, evaluation_mode="RENDER")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.usd_import(filepath=str(target))
+    skin = next(obj for obj in bpy.data.objects if obj.type == "MESH" and len(obj.data.vertices) == len(truth[1]))
+    for frame, points in truth.items():
+        bpy.context.scene.frame_set(frame)
+        assert np.abs(shown(skin) - points).max() < 1e-5, f"USD at frame {frame}"
+
+
 def test_shape_keys_of_the_skin_stay_alive(bar: Rig) -> None:
     bend(bar, 0.9)
     bar.skin.shape_key_add(name="Basis", from_mix=False)

@@ -7,7 +7,20 @@ import random
 import bpy
 import numpy as np
 import pytest
-from scene import Rig, bend, bound_bar, drag, edited, enter_edit_mode, fresh, leave_edit_mode, rest, set_mesh, shown, update
+from scene import (
+    Rig,
+    bend,
+    bound_bar,
+    drag,
+    edited,
+    enter_edit_mode,
+    fresh,
+    leave_edit_mode,
+    rest,
+    set_mesh,
+    shown,
+    update,
+)
 
 
 def push(name: str) -> None:

@@ -9,6 +9,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+
 from blend_fixtures.bar import bar
 
 ROOT = Path(__file__).parent.parent.parent

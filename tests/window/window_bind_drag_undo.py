@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import bpy
@@ -11,6 +12,7 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent.parent)]
 import driver
+
 from blend_fixtures.build import build_biped
 
 
@@ -96,7 +98,7 @@ def drag_a_posed_vertex(rig: object) -> Iterator[float | None]:
         moved.append((np.abs(base(cage) - rest_before).max(), np.abs(points(skin) - skin_before).max()))
         if step == 5:
             driver.screenshot("4_during_drag")
-    live = all(b[0] > a[0] and b[1] > a[1] for a, b in zip(moved[1:], moved[2:], strict=False))
+    live = all(b[0] > a[0] and b[1] > a[1] for a, b in pairwise(moved[1:]))
     driver.check("rest cage and skin follow every mouse move", live, moved[-1])
     driver.click((place[0] + 48, place[1] + 40))
     yield 0.4
@@ -124,7 +126,7 @@ def scrub(rig: object) -> Iterator[float | None]:
             driver.key("RIGHT_ARROW")
             yield 0.15
         seen.append(points(skin))
-    moved = min(np.abs(a - b).max() for a, b in zip(seen, seen[1:], strict=False))
+    moved = min(np.abs(a - b).max() for a, b in pairwise(seen))
     driver.check("scrubbing moves the skin on every frame", moved > 1e-3, f"frame {scene.frame_current}")
     driver.screenshot("7_scrubbed")
     driver.key("SPACE")
