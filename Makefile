@@ -29,8 +29,8 @@ lint: $(VENV)/.core
 	$(VENV)/bin/ruff format --check .
 	cd addon && ../$(VENV)/bin/mypy --config-file ../pyproject.toml session.py
 
-bench: $(VENV)/.core
-	cargo bench --quiet -p cage_rig
+bench: $(VENV)/.extension
+	$(PY) tools/with_extension.py tests/bench/bench_blender.py
 
 fixtures: $(VENV)/.blender
 	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures

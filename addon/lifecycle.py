@@ -45,13 +45,13 @@ def bind(
     for obj in (cage, *skins):
         _refuse_taken(obj)
     bound = _read(context, cage, armature_object, skins)
-    _compute(cage, bound)
+    session = _compute(cage, bound)
     settings = cage.cage_rig
     settings.version, settings.armature = props.VERSION, armature_object
     for obj in skins:
         settings.skins.add().object = obj
     try:
-        _install(context, cage, bound)
+        _install(context, cage, bound, session)
     except Exception:
         unbind(cage)
         raise
@@ -71,12 +71,12 @@ def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> None:
     if not skins:
         raise BindError(f"All skins of '{cage.name}' were deleted; undo, or Unbind")
     bound = _read(context, cage, settings.armature, skins)
-    _compute(cage, bound)
+    session = _compute(cage, bound)
     for index in reversed(range(len(settings.skins))):
         if settings.skins[index].object not in skins:
             _remove_mesh(settings.skins[index].snapshot)
             settings.skins.remove(index)
-    _install(context, cage, bound)
+    _install(context, cage, bound, session)
 
 
 def unbind(cage: bpy.types.Object) -> None:
@@ -201,15 +201,15 @@ def _refuse_bendy(obj: bpy.types.Object, rest: armature.RestBones, skins: list[S
         )
 
 
-def _compute(cage: bpy.types.Object, bound: _Bound) -> None:
+def _compute(cage: bpy.types.Object, bound: _Bound) -> Session:
     """Let the core bind: what it refuses is refused before anything is written."""
     try:
-        Session(bound.snapshot)
+        return Session(bound.snapshot)
     except SessionError as error:
         raise BindError(f"'{cage.name}' can't be bound: {error}") from error
 
 
-def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound) -> None:
+def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound, session: Session) -> None:
     settings = cage.cage_rig
     sync.drop(cage)
     _write_joints(cage, bound)
@@ -226,7 +226,7 @@ def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound) 
         skin.skin_to_rig = bound.skin_to_rig[index].T.tolist()
         _join(skin.object, cage)
     settings.state = "PAUSED"  # a rig until the first update makes it live
-    sync.start(cage, context.evaluated_depsgraph_get())
+    sync.start(cage, context.evaluated_depsgraph_get(), session)
 
 
 def _join(skin: bpy.types.Object, cage: bpy.types.Object) -> None:

@@ -33,10 +33,14 @@ def rigs() -> list[bpy.types.Object]:
     """The rest cage objects of all rigs in the file."""
     if _found.count != len(bpy.data.objects):
         _look()
-    cages = [bpy.data.objects.get(name) for name in _found.names]
+    return _cages(_found.names)
+
+
+def _cages(names: list[str]) -> list[bpy.types.Object]:
+    cages = [bpy.data.objects.get(name) for name in names]
     if any(cage is None or not is_rig(cage) for cage in cages):  # renamed or gone
         _look()
-        cages = [bpy.data.objects[name] for name in _found.names]
+        return [bpy.data.objects[name] for name in _found.names]
     return cages
 
 
@@ -46,15 +50,15 @@ def is_rig(obj: bpy.types.Object) -> bool:
 
 
 def touched(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
-    """The rigs of which a participant is among the updates of `depsgraph`."""
-    cages = rigs()
-    if not cages:
+    """The rigs of which a participant is among the updates of `depsgraph`. Runs on every update: must idle cheaply."""
+    if _found.count != len(bpy.data.objects):
+        _look()
+    if not _found.participants:
         return []
     names: set[str] = set()
     for update in depsgraph.updates:
-        original = update.id.original
-        names |= _found.participants.get(original.session_uid, set())
-    return [cage for cage in cages if cage.name in names]
+        names |= _found.participants.get(update.id.original.session_uid, set())
+    return _cages(sorted(names)) if names else []
 
 
 def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:

@@ -89,9 +89,10 @@ def restored() -> None:
         update(cage, depsgraph, Event.RESTORED)
 
 
-def start(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """After a bind: compute and show the rig."""
+def start(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, session: Session) -> None:
+    """After a bind: show the rig, which runs in the session that the bind computed."""
     drop(cage)
+    _running[cage.session_uid] = _Running(session)
     update(cage, depsgraph, Event.RESTORED)
 
 

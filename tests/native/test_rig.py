@@ -1,0 +1,163 @@
+"""The rig through its Python names: the cycle, the copies, the twins that write in place."""
+
+import threading
+
+import cage_rig_core as core
+import numpy as np
+import pytest
+
+
+def test_the_six_structures_and_the_edits(bar, bent):
+    rig = core.CoupledRig(**bar)
+    assert rig.rest_skin.shape == rig.posed_skin.shape == bar["skin_vertices"].shape
+    np.testing.assert_array_equal(rig.rest_cage, bar["cage_vertices"])
+    np.testing.assert_allclose(rig.joints, bar["joints"], atol=1e-12)
+    rig.pose(bent)
+    np.testing.assert_allclose(rig.transforms, bent, atol=1e-12)
+    np.testing.assert_allclose(rig.posed_joints, bar["joints"], atol=1e-12)
+    wanted = rig.posed_cage + 0.1 * np.sin(np.arange(48)).reshape(16, 3)
+    rig.edit_posed_cage(wanted)
+    fresh = core.CoupledRig(**bar)
+    fresh.play(rig.rest_cage, bent)
+    assert np.abs(fresh.posed_cage - wanted).max() <= 1e-9 * rig.size
+    rig.edit_rest_cage(bar["cage_vertices"])
+    rig.pose(np.tile(np.eye(4), (2, 1, 1)))
+    np.testing.assert_allclose(rig.posed_skin, bar["skin_vertices"], atol=1e-6)
+
+
+def test_results_are_fresh_float64_copies(bar):
+    rig = core.CoupledRig(**bar)
+    for name in [
+        "rest_skin",
+        "posed_skin",
+        "rest_cage",
+        "posed_cage",
+        "joints",
+        "posed_joints",
+        "transforms",
+        "cage_coords",
+        "joint_coords",
+    ]:
+        first = getattr(rig, name)
+        assert first.dtype == np.float64, name
+        first[...] = 7
+        assert not np.array_equal(getattr(rig, name), first), name
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_into_writes_a_range_of_rows_in_any_layout(bar, bent, dtype):
+    rig = core.CoupledRig(**bar)
+    rig.pose(bent)
+    expected = rig.posed_skin.astype(dtype)
+    for out in [
+        np.zeros((50, 3), dtype),
+        np.zeros((50, 3), dtype, order="F"),
+        np.zeros((100, 6), dtype)[::2, ::2],
+        np.zeros(150, dtype),
+    ]:
+        rig.posed_skin_into(out, start=20)
+        np.testing.assert_array_equal(out.reshape(50, 3), expected[20:70])
+    cage = np.zeros((16, 3), dtype)
+    rig.posed_cage_into(cage)
+    np.testing.assert_array_equal(cage, rig.posed_cage.astype(dtype))
+    rest = np.zeros((124, 3), dtype)
+    rig.rest_skin_into(rest)
+    np.testing.assert_array_equal(rest, rig.rest_skin.astype(dtype))
+
+
+def test_offsets_move_the_visible_skin_only(bar, bent):
+    rig = core.CoupledRig(**bar)
+    rig.pose(bent)
+    cage, skin = rig.posed_cage, rig.posed_skin
+    rig.offset_rest_skin(np.full_like(bar["skin_vertices"], 0.25))
+    np.testing.assert_array_equal(rig.posed_cage, cage)
+    assert np.abs(rig.posed_skin - skin).max() > 0.2
+    rig.offset_rest_skin(None)
+    np.testing.assert_array_equal(rig.posed_skin, skin)
+
+
+def test_work_and_report_are_plain_dictionaries(bar, bent):
+    rig = core.CoupledRig(**bar)
+    rig.pose(bent)
+    rig.posed_skin, rig.posed_cage
+    before = rig.work
+    assert before == {
+        "anchor_factorisations": 1,
+        "reverse_factorisations": 0,
+        "reverse_solves": 0,
+        "rest_passes": 0,
+        "skin_passes": 1,
+        "cage_fits": 1,
+    }
+    rig.pose(bent)
+    rig.posed_skin
+    assert rig.work == before
+    assert rig.report["regularised"] == 0 and rig.report["anchor_max_ratio"] <= 1.05
+    assert rig.report["joints_outside_hull"] == [] and not rig.report["cage_turned"]
+
+
+def test_known_results_are_taken_as_they_are(bar):
+    first = core.CoupledRig(**bar)
+    again = core.CoupledRig(
+        **bar,
+        anchors=first.anchors,
+        cage_coords=first.cage_coords,
+        joint_coords=first.joint_coords,
+        center_coords=first.cage_coords,
+    )
+    np.testing.assert_array_equal(first.anchors, again.anchors)
+    np.testing.assert_array_equal(first.joint_coords, again.joint_coords)
+    assert first.center_coords is None
+    np.testing.assert_array_equal(again.center_coords, first.cage_coords)
+
+
+def test_compressed_weights_equal_dense_ones(bar):
+    dense = bar["skin_weights"]
+    indptr = np.arange(0, dense.size + 1, 2, dtype=np.int32)
+    triple = (indptr, np.tile(np.array([0, 1], np.uint8), len(dense)), dense.ravel())
+    pose = np.tile(np.eye(4), (2, 1, 1))
+    pose[1, :3, 3] = 1
+    rigs = [core.CoupledRig(**{**bar, "skin_weights": weights}) for weights in (dense, triple)]
+    for rig in rigs:
+        rig.pose(pose)
+    np.testing.assert_array_equal(rigs[0].posed_skin, rigs[1].posed_skin)
+
+
+def test_the_gil_is_released_during_a_bind(bar):
+    rings = [(i / 400, 0.6) for i in range(4001)]
+    from conftest import square_tube
+
+    skin, faces = square_tube(rings)
+    weights = np.ones((len(skin), 2))
+    big = {**bar, "skin_vertices": skin, "skin_faces": faces, "skin_weights": weights}
+    ticks = []
+    thread = threading.Thread(target=core.CoupledRig, kwargs=big)
+    thread.start()
+    while thread.is_alive():
+        ticks.append(1)
+    assert len(ticks) > 100
+
+
+def test_a_panic_is_an_exception_and_poisons_the_rig_alone(bar):
+    rig = core.CoupledRig(**bar)
+    with pytest.raises(BaseException) as caught:
+        rig._panic_for_tests()
+    assert type(caught.value).__name__ == "PanicException"
+    with pytest.raises(core.CageRigError, match="bind again"):
+        rig.pose(np.tile(np.eye(4), (2, 1, 1)))
+    with pytest.raises(core.CageRigError, match="bind again"):
+        rig.posed_skin
+    assert core.CoupledRig(**bar).size > 0
+
+
+def test_families_list_their_members():
+    assert "lbs" in core.skinning_methods()
+    assert "mean_value" in core.coordinate_kinds()
+    assert core.__version__
+
+
+def test_a_cage_can_be_checked_alone(bar):
+    found = core.check_cage(bar["cage_vertices"], bar["cage_faces"])
+    assert found["turned"] is False and found["triangles"].shape == (28, 3)
+    triangles = found["triangles"][:, ::-1]
+    assert core.check_cage(bar["cage_vertices"], triangles)["turned"] is True
