@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -213,6 +214,7 @@ def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound, 
     settings = cage.cage_rig
     sync.drop(cage)
     _write_joints(cage, bound)
+    settings.bind_id = uuid.uuid4().hex
     settings.cage_to_rig = bound.cage_to_rig.T.tolist()
     _remove_mesh(settings.snapshot)
     settings.snapshot = snapshot.write(f"{cage.name} Bind", bound.snapshot.cage, bound.snapshot.cage_faces, None)

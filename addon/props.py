@@ -94,6 +94,7 @@ class CageRigSettings(bpy.types.PropertyGroup):
     skins: CollectionProperty(type=CageRigSkin, name="Skins", override=OVERRIDABLE | {"USE_INSERTION"})
     joints: CollectionProperty(type=CageRigJoint, name="Joints", override=OVERRIDABLE | {"USE_INSERTION"})
     snapshot: PointerProperty(type=bpy.types.Mesh, name="Cage at Bind", override=OVERRIDABLE)
+    bind_id: StringProperty(name="Bind", description="Which bind the snapshots are of", override=OVERRIDABLE)
     cage_to_rig: FloatVectorProperty(name="Cage to Rig", subtype="MATRIX", size=(4, 4), override=OVERRIDABLE)
 
     # Marks on participants. `owner` is the rest cage they belong to.

@@ -35,6 +35,7 @@ class _Running:
     """A session, and what of Blender it has seen, so that the next change can be told apart."""
 
     session: Session
+    bind_id: str  # of the snapshot that the session was made from
     cage: Points | None = None  # rest cage, rig space, as last read
     cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
     posed: Points | None = None  # posed cage as last read or written
@@ -82,9 +83,9 @@ def restoring() -> None:
 def restored() -> None:
     """After undo, redo or load: read everything again."""
     global _restoring
-    _restoring = False
     registry.forget()
     depsgraph = bpy.context.evaluated_depsgraph_get()
+    _restoring = False
     for cage in registry.rigs():
         update(cage, depsgraph, Event.RESTORED)
 
@@ -92,7 +93,7 @@ def restored() -> None:
 def start(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, session: Session) -> None:
     """After a bind: show the rig, which runs in the session that the bind computed."""
     drop(cage)
-    _running[cage.session_uid] = _Running(session)
+    _running[cage.session_uid] = _Running(session, cage.cage_rig.bind_id)
     update(cage, depsgraph, Event.RESTORED)
 
 
@@ -129,7 +130,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     if not (source.is_evaluated and bones.is_evaluated):
         return  # in no view of this depsgraph: nothing of it is shown
     running = _running.get(cage.session_uid)
-    if running is None:
+    if running is None or running.bind_id != cage.cage_rig.bind_id:  # an undo may bring back another bind
         running = _running[cage.session_uid] = _start(cage)
         event = Event.RESTORED
     if event is Event.RESTORED:
@@ -162,7 +163,8 @@ def _start(cage: bpy.types.Object) -> _Running:
                 positions.read_faces(settings.snapshot),
                 settings.method.lower(),
             )
-        )
+        ),
+        settings.bind_id,
     )
 
 

@@ -30,7 +30,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "__init__": (set(), {"handlers", "operators", "props", "ui"}),
 }
 STANDARD = {"__future__", "atexit", "collections", "contextlib", "dataclasses", "enum", "functools", "itertools"}
-STANDARD |= {"textwrap", "typing"}
+STANDARD |= {"textwrap", "typing", "uuid"}
 
 
 def layer_of(path: Path) -> str:

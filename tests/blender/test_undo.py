@@ -17,6 +17,7 @@ from scene import (
     fresh,
     leave_edit_mode,
     rest,
+    select,
     set_mesh,
     shown,
     update,
@@ -104,6 +105,24 @@ def test_undo_of_the_bind(undoable: Rig) -> None:
     bpy.ops.ed.redo()
     assert_same(state(), live)
     assert current().settings.state == "LIVE"
+
+
+def test_undo_of_a_rebind(undoable: Rig) -> None:
+    edit_pose(undoable, 0.7)
+    push("bend")
+    wanted = state()
+    rig = current()
+    skin, cage = rig.skin, rig.cage
+    set_mesh(skin, rest(skin) * np.float32([1, 0.5, 0.5]))
+    set_mesh(cage, rest(cage) * np.float32([1, 0.7, 0.7]))
+    select([cage], cage)
+    bpy.ops.cage_rig.rebind()
+    push("rebind")
+    rebound = state()
+    bpy.ops.ed.undo()
+    assert_same(state(), wanted)
+    bpy.ops.ed.redo()
+    assert_same(state(), rebound)
 
 
 def test_undo_in_edit_mode_of_the_posed_cage_brings_the_rest_cage_back(undoable: Rig) -> None:

@@ -1,15 +1,13 @@
 """A small rig for the binding's tests: a bar of square rings in a box."""
 
-from pathlib import Path
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-core = pytest.importorskip("cage_rig_core", reason="the core is not installed: make setup")
 
-
-def square_tube(rings):
+def _square_tube(rings):
     """Square rings along x, closed at both ends: vertices and (corner indices, face sizes)."""
     around = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     vertices = np.array([(x, w * y, w * z) for x, w in rings for y, z in around], dtype=float)
@@ -22,11 +20,17 @@ def square_tube(rings):
     return vertices, (np.concatenate(quads), np.full(len(quads), 4))
 
 
+@pytest.fixture(scope="session")
+def square_tube():
+    """The function of the same name."""
+    return _square_tube
+
+
 @pytest.fixture
 def bar():
     """Keyword arguments of `CoupledRig`."""
-    skin, skin_faces = square_tube([(i / 3, 0.6) for i in range(31)])
-    cage, cage_faces = square_tube([(-0.5, 0.9), (3.4, 1.1), (6.8, 1.1), (10.5, 0.9)])
+    skin, skin_faces = _square_tube([(i / 3, 0.6) for i in range(31)])
+    cage, cage_faces = _square_tube([(-0.5, 0.9), (3.4, 1.1), (6.8, 1.1), (10.5, 0.9)])
     step = 1 / (1 + np.exp((skin[:, 0] - 5) / 0.5))
     return {
         "skin_vertices": skin,

@@ -3,7 +3,6 @@
 import cage_rig_core as core
 import numpy as np
 import pytest
-from conftest import square_tube
 
 mp = pytest.importorskip("mpmath", reason="mpmath is not installed").mp
 
@@ -22,9 +21,9 @@ def cross(a, b):
 
 def exact_row(point, vertices, triangles):
     """Each face's mean vector taken apart along the directions to its corners."""
-    toward = [[mp.mpf(float(c)) - mp.mpf(float(p)) for c, p in zip(vertex, point)] for vertex in vertices]
+    toward = [[mp.mpf(float(c)) - mp.mpf(float(p)) for c, p in zip(vertex, point, strict=False)] for vertex in vertices]
     lengths = [mp.sqrt(mp.fdot(t, t)) for t in toward]
-    units = [[x / length for x in t] for t, length in zip(toward, lengths)]
+    units = [[x / length for x in t] for t, length in zip(toward, lengths, strict=False)]
     row = [mp.mpf(0)] * len(vertices)
     for triangle in triangles:
         u = [units[i] for i in triangle]
@@ -33,7 +32,7 @@ def exact_row(point, vertices, triangles):
         for k, normal in enumerate(normals):
             sine = mp.sqrt(mp.fdot(normal, normal))
             angle = mp.atan2(sine, mp.fdot(u[(k + 1) % 3], u[(k + 2) % 3]))
-            mean = [m + angle / 2 * n / sine for m, n in zip(mean, normal)]
+            mean = [m + angle / 2 * n / sine for m, n in zip(mean, normal, strict=False)]
         determinant = mp.fdot(u[0], normals[0])
         for k, corner in enumerate(triangle):
             row[corner] += mp.fdot(mean, normals[k]) / determinant / lengths[corner]
@@ -43,7 +42,7 @@ def exact_row(point, vertices, triangles):
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("distance", [1e-3, 1e-4, 1e-6, 1e-8, 1e-10])
-def test_rows_are_right_to_1e_9(place, distance):
+def test_rows_are_right_to_1e_9(square_tube, place, distance):
     vertices, faces = square_tube([(-0.5, 0.9), (3.4, 1.1), (6.8, 1.1), (10.5, 0.9)])
     triangles = core.check_cage(vertices, faces)["triangles"]
     size = np.linalg.norm(np.ptp(vertices, axis=0))
