@@ -255,3 +255,16 @@ def test_bind_while_posed_binds_the_rest_position() -> None:
     rig = bind(objects)
     assert np.abs(shown(rig.skin) - native(rig.skin)).max() < 1e-5 * rig.size
     assert objects.armature.data.pose_position == "POSE"
+
+
+def test_a_cage_that_follows_the_armature_already_does_not_follow_twice() -> None:
+    objects = build_bar()
+    group = objects.cage.vertex_groups.new(name="upper")
+    group.add(list(range(len(objects.cage.data.vertices))), 1.0, "REPLACE")
+    objects.cage.modifiers.new("Armature", "ARMATURE").object = objects.armature
+    rig = bind(objects)
+    bend(rig, 1.0)
+    assert np.abs(shown(rig.skin) - native(rig.skin)).max() < 1e-5 * rig.size
+    select([rig.cage], rig.cage)
+    bpy.ops.cage_rig.unbind()
+    assert rig.cage.modifiers["Armature"].show_viewport and rig.cage.modifiers["Armature"].show_render

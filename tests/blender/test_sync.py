@@ -272,8 +272,8 @@ def test_hidden_participants_still_drive_the_skin(bar: Rig, hide: object, tmp_pa
     assert bar.settings.state == "LIVE", bar.settings.message
 
 
-def silhouettes(folder: Path) -> list[np.ndarray]:
-    """Render frames 4 to 6 with Cycles and return their alpha, 96 by 96."""
+def silhouettes(folder: Path, frames: tuple[int, ...] = (4, 5, 6), *, one_by_one: bool = False) -> list[np.ndarray]:
+    """Render frames with Cycles, as an animation or by F12 one by one, and return their alpha, 96 by 96."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale, camera.location = "ORTHO", 3.0, (0.0, 0.0, 5.0)
@@ -281,12 +281,18 @@ def silhouettes(folder: Path) -> list[np.ndarray]:
     scene.camera, scene.render.engine, scene.cycles.samples = camera, "CYCLES", 4
     scene.render.resolution_x = scene.render.resolution_y = 96
     scene.render.film_transparent = True
-    scene.render.filepath = str(folder / "frame_")
     scene.render.use_lock_interface = True
-    scene.frame_start, scene.frame_end = 4, 6
-    bpy.ops.render.render(animation=True)
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
+    if one_by_one:
+        for frame in frames:
+            scene.frame_set(frame)
+            scene.render.filepath = str(folder / f"frame_{frame:04}.png")
+            bpy.ops.render.render(write_still=True)
+    else:
+        scene.render.filepath = str(folder / "frame_")
+        bpy.ops.render.render(animation=True)
     alphas = []
-    for frame in (4, 5, 6):
+    for frame in frames:
         image = bpy.data.images.load(str(folder / f"frame_{frame:04}.png"))
         alphas.append(np.array(image.pixels[:], np.float32).reshape(96, 96, 4)[:, :, 3])
         bpy.data.images.remove(image)
@@ -297,6 +303,8 @@ def silhouettes(folder: Path) -> list[np.ndarray]:
 def assert_rendered(rig: Rig, truth: dict[int, np.ndarray], folder: Path) -> None:
     """Render the rig, and then plain meshes of the true frames in its place: the pictures are the same."""
     live = silhouettes(folder)
+    for still, moving in zip(silhouettes(folder, one_by_one=True), live, strict=True):
+        assert np.abs(still - moving).sum() < 0.5, "F12 shows what the animation shows"
     assert min(np.abs(live[0] - live[1]).sum(), np.abs(live[1] - live[2]).sum()) > 1.0, "every frame differs"
     rig.skin.hide_render = True
     scene = bpy.context.scene
