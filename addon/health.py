@@ -89,9 +89,9 @@ def _skins_problem(cage: bpy.types.Object) -> str:
             return f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind"
         if modifier.input_object(ours, "Rest Cage") != cage:
             return f"'{obj.name}' follows another cage; press Rebind to take it back"
-        blocking = modifier.changes_count_before(obj, list(obj.modifiers).index(ours))
+        blocking = modifier.blocking(obj, list(obj.modifiers).index(ours))
         if blocking:
-            return f"Modifier '{blocking}' of '{obj.name}' changes the vertices before Cage Rig; move it after"
+            return f"Modifier '{blocking}' of '{obj.name}' stands before Cage Rig, which hides it; move it after"
     return ""
 
 

@@ -146,11 +146,11 @@ def _read(
     parts = [_read_skin(obj, deforming, matrix) for obj, matrix in zip(skins, to_rig, strict=False)]
     _refuse_bendy(armature_object, rest, parts)
     for obj in skins:
-        blocking = modifier.changes_count_before(obj, modifier.place(obj, armature_object))
+        blocking = modifier.blocking(obj, modifier.place(obj, armature_object))
         if blocking:
             raise BindError(
-                f"Modifier '{blocking}' of '{obj.name}' changes the vertices before the Armature modifier; "
-                "apply it or move it after"
+                f"Modifier '{blocking}' of '{obj.name}' stands before the Armature modifier, where Cage Rig would "
+                "hide what it does; apply it or move it after"
             )
     cage_points = positions.apply_matrix(to_rig[-1], positions.read_base(cage.data))
     core = Snapshot(

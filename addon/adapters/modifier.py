@@ -16,12 +16,10 @@ from .positions import Points
 
 NAME = "Cage Rig"
 ATTRIBUTE = "cage_rig.posed"
-# Modifiers that move vertices and never add or remove any: they may stand before ours.
-DEFORM_ONLY = {
-    "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP",
-    "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH", "SURFACE_DEFORM", "WARP", "WAVE", "CLOTH",
-    "COLLISION", "SOFT_BODY", "UV_PROJECT", "UV_WARP", "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX",
-    "VERTEX_WEIGHT_PROXIMITY", "NORMAL_EDIT", "WEIGHTED_NORMAL", "DATA_TRANSFER", "MESH_CACHE",
+# Modifiers that touch no vertex: only they may stand before ours, which sets every position anew.
+HARMLESS = {
+    "UV_PROJECT", "UV_WARP", "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "COLLISION",
+    "NORMAL_EDIT", "WEIGHTED_NORMAL", "DATA_TRANSFER",
 }  # fmt: skip
 
 
@@ -156,10 +154,10 @@ def place(skin: bpy.types.Object, armature: bpy.types.Object) -> int:
     return 0
 
 
-def changes_count_before(skin: bpy.types.Object, index: int) -> str | None:
-    """The name of a shown modifier before `index` that may add or remove vertices, or None."""
+def blocking(skin: bpy.types.Object, index: int) -> str | None:
+    """The name of a shown modifier before `index` whose effect ours would spoil or hide, or None."""
     for modifier in list(skin.modifiers)[:index]:
-        if modifier.type not in DEFORM_ONLY and (modifier.show_viewport or modifier.show_render):
+        if modifier.type not in HARMLESS and (modifier.show_viewport or modifier.show_render):
             return modifier.name
     return None
 

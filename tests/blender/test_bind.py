@@ -206,6 +206,13 @@ def subdivision_first(objects: RigObjects) -> str:
     return "Smooth it"
 
 
+def lattice_first(objects: RigObjects) -> str:
+    skin = objects.skins[0]
+    skin.modifiers.new("Bend it", "LATTICE")
+    skin.modifiers.move(1, 0)
+    return "Bend it"
+
+
 def flat_skin(objects: RigObjects) -> str:
     objects.skins[0].scale.x = 0.0
     update()
@@ -214,7 +221,18 @@ def flat_skin(objects: RigObjects) -> str:
 
 @pytest.mark.parametrize(
     "spoil",
-    [no_armature, no_skin, open_cage, flipped_face, no_weights, shared_mesh, bendy_bone, subdivision_first, flat_skin],
+    [
+        no_armature,
+        no_skin,
+        open_cage,
+        flipped_face,
+        no_weights,
+        shared_mesh,
+        bendy_bone,
+        subdivision_first,
+        lattice_first,
+        flat_skin,
+    ],
 )
 def test_refusals_say_what_and_change_nothing(spoil: object) -> None:
     objects = build_bar()
@@ -268,3 +286,26 @@ def test_a_cage_that_follows_the_armature_already_does_not_follow_twice() -> Non
     select([rig.cage], rig.cage)
     bpy.ops.cage_rig.unbind()
     assert rig.cage.modifiers["Armature"].show_viewport and rig.cage.modifiers["Armature"].show_render
+
+
+def test_modifiers_after_ours_work_on_the_posed_skin() -> None:
+    objects = build_bar()
+    objects.skins[0].modifiers.new("Smooth it", "SUBSURF").levels = 1
+    rig = bind(objects)
+    bend(rig, 1.0)
+    assert rig.settings.state == "LIVE", rig.settings.message
+    live = shown(rig.skin)
+    assert len(live) > len(rest(rig.skin))
+    assert np.abs(live - native(rig.skin)).max() < 1e-5 * rig.size
+
+
+def test_a_deforming_modifier_moved_before_ours_pauses(bar: Rig) -> None:
+    modifier = bar.skin.modifiers.new("Bend it", "SIMPLE_DEFORM")
+    update()
+    assert bar.settings.state == "LIVE"
+    bar.skin.modifiers.move(len(bar.skin.modifiers) - 1, 0)
+    update()
+    assert bar.settings.state == "PAUSED" and modifier.name in bar.settings.message
+    bar.skin.modifiers.move(0, len(bar.skin.modifiers) - 1)
+    update()
+    assert bar.settings.state == "LIVE"
