@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .biped_cage import biped_cage
+from .biped_cage import biped_cage, fat_cage, short_cage
 from .biped_shape import body_parts, outfit_parts
 from .biped_skeleton import biped_bones
 from .parts import Character, Part, Skin, join_parts
@@ -16,4 +16,6 @@ def biped() -> Character:
     def skin(name: str, parts: list[Part]) -> Skin:
         return join_parts(name, parts, [part_weights(part, bones) for part in parts])
 
-    return Character("Biped", [skin("Body", body_parts()), skin("Outfit", outfit_parts())], bones, biped_cage())
+    cage = biped_cage()
+    skins = [skin("Body", body_parts()), skin("Outfit", outfit_parts())]
+    return Character("Biped", skins, bones, cage, {"Fat": fat_cage(cage), "Short": short_cage(cage)})

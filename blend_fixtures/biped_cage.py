@@ -36,6 +36,47 @@ def biped_cage() -> Cage:
     return half.mirrored()
 
 
+def fat_cage(cage: Cage) -> Array:
+    """The cage of a stouter biped: belly and seat grow most, limbs and cheeks a little (#C by 3)."""
+    x, y, z = cage.vertices.T
+    trunk = np.where(np.abs(x) < 0.30, 1.0, 0.0)
+    belly = 0.62 * trunk * np.exp(-(((z - 0.84) / 0.20) ** 2))
+    grown = cage.vertices.copy()
+    grown[:, 0] += x * belly
+    grown[:, 1] += (y - 0.01) * belly * np.where(y < 0.0, 1.25, 0.75)
+    grown += _limb_growth(cage.vertices)
+    return grown
+
+
+def short_cage(cage: Cage) -> Array:
+    """The cage of a small biped with a big head: other proportions, so that every joint has to move (#C by 3)."""
+    knots = np.array([-1.0, 0.10, 0.62, 1.30, 1.37, 2.0])
+    shrunk = cage.vertices.copy()
+    shrunk[:, 2] = np.interp(cage.vertices[:, 2], knots, [-1.0, 0.10, 0.40, 0.90, 0.965, 1.72])
+    head = cage.vertices[:, 2] > 1.33
+    shrunk[head, :2] *= 1.16
+    trunk = (np.abs(cage.vertices[:, 0]) < 0.30) & ~head & (cage.vertices[:, 2] > 0.55)
+    shrunk[trunk, 0] *= 0.94
+    arm = np.abs(cage.vertices[:, 0]) > 0.30
+    shift = 0.22 * (np.abs(cage.vertices[:, 0]) - 0.20)
+    shrunk[arm, 0] -= (np.sign(cage.vertices[:, 0]) * shift)[arm]
+    return shrunk
+
+
+def _limb_growth(vertices: Array) -> Array:
+    """Offsets that widen the arms and legs about their axes by a third (#C by 3)."""
+    side = np.where(vertices[:, 0] < 0.0, -1.0, 1.0)[:, None] * [1.0, 0.0, 0.0] + [0.0, 1.0, 1.0]
+    left = vertices * side
+    arm = (left[:, 0] > 0.30) & (left[:, 0] < 0.52) & (left[:, 2] > 0.6)
+    leg = (left[:, 2] < 0.50) & (left[:, 2] > 0.25)
+    axis = (WRIST - SHOULDER) / np.linalg.norm(WRIST - SHOULDER)
+    offset = left - SHOULDER
+    growth = 0.34 * arm[:, None] * (offset - (offset @ axis)[:, None] * axis)
+    across = (left - [0.112, 0.005, 0.0]) * [1.0, 1.0, 0.0]
+    growth += leg[:, None] * across * np.where(across[:, :1] < 0.0, [0.0, 0.28, 0.0], [0.28, 0.28, 0.0])
+    return growth * side
+
+
 class _Half:
     """The half x ≥ 0 of a cage under construction. Trunk rings run front middle, front, back, back middle."""
 

@@ -46,7 +46,7 @@ def segment_distance(points: Array, a: Sequence[float], b: Sequence[float]) -> A
 
 
 def weight_fault(weights: Array) -> str:
-    """What is wrong with `weights` (#V by #J): rows must be non-negative, sum to 1 and have few entries; "" if nothing."""
+    """What is wrong with `weights` (#V by #J), or "": rows must be non-negative, sum to 1 and have few entries."""
     sums = np.abs(weights.sum(axis=1) - 1.0)
     if not np.isfinite(weights).all() or weights.min() < 0.0 or sums.max() > 1e-9:
         return f"row {int(sums.argmax())} sums to {weights[sums.argmax()].sum():.6f}"

@@ -1,0 +1,40 @@
+"""Everything that the demo asks of the add-on, through its public operators and settings, as an artist would."""
+
+from __future__ import annotations
+
+import bpy
+
+from blend_fixtures.build import RigObjects
+
+
+def bind(rig: RigObjects) -> None:
+    """Select skins, armature and cage, and bind them. Raises RuntimeError with the add-on's message if it refuses."""
+    bpy.ops.object.select_all(action="DESELECT")
+    for part in rig.all:
+        part.select_set(True)
+    bpy.context.view_layer.objects.active = rig.cage
+    bpy.ops.cage_rig.bind()
+    bpy.ops.object.select_all(action="DESELECT")
+    require_live(rig)
+
+
+def require_live(rig: RigObjects) -> None:
+    """Raise RuntimeError, with what the panel says, unless the rig is live."""
+    settings = rig.cage.cage_rig
+    if settings.state != "LIVE":
+        raise RuntimeError(f"the rig of '{rig.cage.name}' is not live: {settings.message or settings.state}")
+
+
+def posed_cage(rig: RigObjects) -> bpy.types.Object:
+    """The posed cage object that binding made."""
+    return rig.cage.cage_rig.posed_cage
+
+
+def refit_armature(rig: RigObjects) -> bpy.types.Object:
+    """The refit bones that binding made."""
+    return rig.cage.cage_rig.refit_armature
+
+
+def is_available() -> bool:
+    """Whether the add-on is enabled in this Blender."""
+    return hasattr(bpy.types.Object, "cage_rig")
