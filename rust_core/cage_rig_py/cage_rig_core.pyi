@@ -16,6 +16,22 @@ Faces: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike]
 Weights: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike, ArrayLike]
 """(#M, #J), or a triple (indptr, indices, data)."""
 
+__all__ = [
+    "ArrayError",
+    "CageError",
+    "CageRigError",
+    "CoupledRig",
+    "PoseError",
+    "SkeletonError",
+    "SkinError",
+    "WeightsError",
+    "__version__",
+    "check_cage",
+    "coordinate_kinds",
+    "mean_value_coordinates",
+    "skinning_methods",
+]
+
 __version__: str
 
 class CageRigError(ValueError): ...
@@ -26,7 +42,7 @@ class SkeletonError(CageRigError): ...
 class PoseError(CageRigError): ...
 class ArrayError(CageRigError): ...
 
-class PanicException(BaseException):  # noqa: N818  (the name is pyo3's)
+class PanicException(BaseException):
     """A bug in the core stopped a call; the rig that raised it refuses further calls."""
 
 class CageCheck(TypedDict):

@@ -24,7 +24,9 @@ impl Cage {
         check_vertices(&vertices, faces)?;
         let pieces = triangulate(&vertices, faces).map_err(|fault| match fault {
             FaceFault::FewCorners { face, corners } => CageError::FewCorners { face, corners },
-            FaceFault::BadIndex { face, vertex } => CageError::BadIndex { face, vertex, vertices: vertices.len() },
+            FaceFault::BadIndex { face, vertex } => {
+                CageError::BadIndex { face, vertex, vertices: vertices.len() }
+            }
         })?;
         check_faces(&vertices, faces, &pieces)?;
         let neighbours = check_edges(&pieces)?;
@@ -174,14 +176,15 @@ fn check_orientation(pieces: &[Piece], neighbours: &Neighbours) -> Result<Vec<us
             next += 1;
             let flip = state[at].is_some_and(|(_, flip)| flip);
             for (side, &(other, agrees)) in neighbours[at].iter().enumerate() {
-                let wanted = flip != !agrees;
+                let wanted = flip == agrees;
                 match state[other] {
                     None => {
                         state[other] = Some((parts, wanted));
                         part.push(other);
                     }
                     Some((_, found)) if found != wanted => {
-                        let (a, b) = (pieces[at].corners[side] as usize, pieces[at].corners[(side + 1) % 3] as usize);
+                        let (a, b) =
+                            (pieces[at].corners[side] as usize, pieces[at].corners[(side + 1) % 3] as usize);
                         return Err(CageError::NotOrientable { a: a.min(b), b: a.max(b) });
                     }
                     Some(_) => {}
@@ -194,10 +197,17 @@ fn check_orientation(pieces: &[Piece], neighbours: &Neighbours) -> Result<Vec<us
     Ok(state.into_iter().map(|s| s.map_or(0, |(part, _)| part)).collect())
 }
 
-fn refuse_flipped(pieces: &[Piece], state: &[Option<(usize, bool)>], part: &[usize]) -> Result<(), CageError> {
+fn refuse_flipped(
+    pieces: &[Piece],
+    state: &[Option<(usize, bool)>],
+    part: &[usize],
+) -> Result<(), CageError> {
     let faces_with = |flip: bool| {
-        let mut faces: Vec<usize> =
-            part.iter().filter(|&&t| state[t].is_some_and(|s| s.1 == flip)).map(|&t| pieces[t].face).collect();
+        let mut faces: Vec<usize> = part
+            .iter()
+            .filter(|&&t| state[t].is_some_and(|s| s.1 == flip))
+            .map(|&t| pieces[t].face)
+            .collect();
         faces.sort_unstable();
         faces.dedup();
         faces

@@ -44,7 +44,11 @@ impl Lu {
         let u = self.factors.U();
         let pivots = (0..u.nrows()).map(|i| u[(i, i)].abs());
         let (low, high) = pivots.fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), p| (l.min(p), h.max(p)));
-        if high > 0.0 && high.is_finite() { low / high } else { 0.0 }
+        if high > 0.0 && high.is_finite() {
+            low / high
+        } else {
+            0.0
+        }
     }
 
     /// Solves for three right sides at once, one per coordinate.

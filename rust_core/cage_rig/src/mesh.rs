@@ -68,7 +68,8 @@ pub(crate) fn triangulate(vertices: &[Point], faces: &Polygons) -> Result<Vec<Pi
             return Err(FaceFault::BadIndex { face, vertex });
         }
         let first = (0..corners.len()).min_by_key(|&i| corners[i]).unwrap_or(0);
-        let polygon: Vec<u32> = (0..corners.len()).map(|i| corners[(first + i) % corners.len()] as u32).collect();
+        let polygon: Vec<u32> =
+            (0..corners.len()).map(|i| corners[(first + i) % corners.len()] as u32).collect();
         let mut add = |corners: [u32; 3]| pieces.push(Piece { corners, face });
         match polygon[..] {
             [a, b, c] => add([a, b, c]),
@@ -118,7 +119,8 @@ fn clip_ears(vertices: &[Point], mut polygon: Vec<u32>, add: &mut impl FnMut([u3
 /// The polygon in its best-fit plane, turning left. The normal is Newell's.
 fn flatten(vertices: &[Point], polygon: &[u32]) -> Vec<[f64; 2]> {
     let corner = |i: usize| vertices[polygon[i % polygon.len()] as usize];
-    let normal: Point = (1..polygon.len()).map(|i| (corner(i) - corner(0)).cross(&(corner(i + 1) - corner(0)))).sum();
+    let normal: Point =
+        (1..polygon.len()).map(|i| (corner(i) - corner(0)).cross(&(corner(i + 1) - corner(0)))).sum();
     let longest = normal.iamax();
     let (u, v) = ((longest + 1) % 3, (longest + 2) % 3);
     let sign = normal[longest].signum();
@@ -128,7 +130,8 @@ fn flatten(vertices: &[Point], polygon: &[u32]) -> Vec<[f64; 2]> {
 fn is_ear(flat: &[[f64; 2]], places: &[usize], at: usize) -> bool {
     let n = places.len();
     let [a, b, c] = [flat[places[(at + n - 1) % n]], flat[places[at]], flat[places[(at + 1) % n]]];
-    let turn = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    let turn =
+        |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
     let inside = |p: [f64; 2]| turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0;
     turn(a, b, c) > 0.0 && (2..n - 1).all(|k| !inside(flat[places[(at + k) % n]]))
 }
@@ -177,7 +180,8 @@ mod tests {
 
     #[test]
     fn a_comb_is_covered_exactly_once_wherever_its_corners_start() {
-        let comb = [[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]];
+        let comb =
+            [[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]];
         let points: Vec<[f64; 3]> = comb.iter().map(|&[x, y]| [x as f64, y as f64, 0.2 * x as f64]).collect();
         let cover = split(&points, &[&(0..12).collect::<Vec<_>>()]);
         let area = |t: &[u32; 3]| {
@@ -194,8 +198,10 @@ mod tests {
 
     #[test]
     fn a_polygon_that_crosses_itself_still_ends() {
-        let star: Vec<[f64; 3]> =
-            (0..5).map(|k| (k as f64 * 0.8 * std::f64::consts::PI).sin_cos()).map(|(s, c)| [c, s, 0.0]).collect();
+        let star: Vec<[f64; 3]> = (0..5)
+            .map(|k| (k as f64 * 0.8 * std::f64::consts::PI).sin_cos())
+            .map(|(s, c)| [c, s, 0.0])
+            .collect();
         assert_eq!(split(&star, &[&[0, 1, 2, 3, 4]]).len(), 3);
     }
 }

@@ -115,7 +115,10 @@ mod tests {
 
     #[test]
     fn bad_parents_are_refused_by_joint() {
-        assert_eq!(skeleton(&[-1, 2]).err(), Some(SkeletonError::BadParent { joint: 1, parent: 2, joints: 2 }));
+        assert_eq!(
+            skeleton(&[-1, 2]).err(),
+            Some(SkeletonError::BadParent { joint: 1, parent: 2, joints: 2 })
+        );
         assert_eq!(skeleton(&[-2]).err(), Some(SkeletonError::BadParent { joint: 0, parent: -2, joints: 1 }));
         assert_eq!(skeleton(&[]).err(), Some(SkeletonError::Empty));
         assert_eq!(

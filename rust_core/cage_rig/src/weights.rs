@@ -158,7 +158,10 @@ mod tests {
         let compressed = |indptr: &[i64], indices: &[i64]| {
             SkinWeights::from_compressed(2, indptr, indices, &[1.0, 1.0]).err()
         };
-        assert_eq!(compressed(&[0, 1, 2], &[0, 2]), Some(WeightsError::BadJoint { vertex: 1, joint: 2, joints: 2 }));
+        assert_eq!(
+            compressed(&[0, 1, 2], &[0, 2]),
+            Some(WeightsError::BadJoint { vertex: 1, joint: 2, joints: 2 })
+        );
         assert_eq!(compressed(&[0, 1, 2], &[0]), Some(WeightsError::Lengths { indices: 1, data: 2 }));
         assert_eq!(compressed(&[0, 2, 1], &[0, 1]), Some(WeightsError::BadIndptr { entry: 2, data: 2 }));
         assert_eq!(compressed(&[0, 1], &[0, 1]), Some(WeightsError::BadIndptr { entry: 1, data: 2 }));

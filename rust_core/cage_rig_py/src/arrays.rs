@@ -30,19 +30,12 @@ fn array<'py>(
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
     let array = match value.cast::<PyUntypedArray>() {
         Ok(array) => array.clone(),
-        Err(_) => value
-            .py()
-            .import("numpy")?
-            .call_method1("asarray", (value,))?
-            .cast_into::<PyUntypedArray>()?,
+        Err(_) => {
+            value.py().import("numpy")?.call_method1("asarray", (value,))?.cast_into::<PyUntypedArray>()?
+        }
     };
-    let lengths_fit = || {
-        array
-            .shape()
-            .iter()
-            .zip(shape)
-            .all(|(found, (_, wanted))| wanted.is_none_or(|w| w == *found))
-    };
+    let lengths_fit =
+        || array.shape().iter().zip(shape).all(|(found, (_, wanted))| wanted.is_none_or(|w| w == *found));
     let kind: char = array.dtype().getattr("kind")?.extract()?;
     let native: bool = array.dtype().getattr("isnative")?.extract()?;
     let size: usize = array.dtype().getattr("itemsize")?.extract()?;
@@ -70,9 +63,7 @@ fn refuse(argument: &str, types: &str, shape: Shape, found: &Bound<'_, PyUntyped
     let found_shape: Vec<String> = found.shape().iter().map(ToString::to_string).collect();
     let (wanted, found_shape) = (wanted.join(", "), found_shape.join(", "));
     let dtype = found.dtype();
-    ArrayError::new_err(format!(
-        "{argument} must be ({wanted}) of {types}, found ({found_shape}) of {dtype}"
-    ))
+    ArrayError::new_err(format!("{argument} must be ({wanted}) of {types}, found ({found_shape}) of {dtype}"))
 }
 
 fn floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Block<f64>> {
@@ -87,10 +78,7 @@ fn floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Bl
             .map(|x| f64::from(*x))
             .collect(),
     };
-    Ok(Block {
-        data,
-        shape: array.shape().to_vec(),
-    })
+    Ok(Block { data, shape: array.shape().to_vec() })
 }
 
 fn finite_floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Block<f64>> {
@@ -100,9 +88,7 @@ fn finite_floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyRe
         Some(at) => {
             let width: usize = block.shape[1..].iter().product();
             let row = at / width;
-            Err(ArrayError::new_err(format!(
-                "{argument} has a value that is not finite in row {row}"
-            )))
+            Err(ArrayError::new_err(format!("{argument} has a value that is not finite in row {row}")))
         }
     }
 }
@@ -114,14 +100,9 @@ pub(crate) fn integers(value: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec
 
 fn integer_block(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Block<i64>> {
     let array = array(value, argument, INTEGERS, shape)?;
-    let wide = array
-        .call_method1("astype", ("int64",))?
-        .cast_into::<PyArrayDyn<i64>>()?;
+    let wide = array.call_method1("astype", ("int64",))?.cast_into::<PyArrayDyn<i64>>()?;
     let data = wide.try_readonly()?.as_array().iter().copied().collect();
-    Ok(Block {
-        data,
-        shape: array.shape().to_vec(),
-    })
+    Ok(Block { data, shape: array.shape().to_vec() })
 }
 
 /// Points, `n by 3`; `rows` is what the first length is called.
@@ -131,11 +112,7 @@ pub(crate) fn points(
     rows: (&str, Option<usize>),
 ) -> PyResult<Vec<Point>> {
     let block = finite_floats(value, argument, &[rows, ("3", Some(3))])?;
-    Ok(block
-        .data
-        .chunks_exact(3)
-        .map(Point::from_column_slice)
-        .collect())
+    Ok(block.data.chunks_exact(3).map(Point::from_column_slice).collect())
 }
 
 /// A dense matrix.
@@ -158,15 +135,10 @@ pub(crate) fn transforms(value: &Bound<'_, PyAny>, joints: usize) -> PyResult<Ve
     let block = finite_floats(value, "transforms", &shape)?;
     let read = |(joint, m): (usize, &[f64])| {
         if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-            return Err(crate::errors::raise(cage_rig::PoseError::NotAffine {
-                joint,
-            }));
+            return Err(crate::errors::raise(cage_rig::PoseError::NotAffine { joint }));
         }
         let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
-        Ok(Transform {
-            linear,
-            translation: Point::new(m[3], m[7], m[11]),
-        })
+        Ok(Transform { linear, translation: Point::new(m[3], m[7], m[11]) })
     };
     block.data.chunks_exact(16).enumerate().map(read).collect()
 }
@@ -175,10 +147,7 @@ pub(crate) fn transforms(value: &Bound<'_, PyAny>, joints: usize) -> PyResult<Ve
 pub(crate) fn polygons(value: &Bound<'_, PyAny>, argument: &str) -> PyResult<Polygons> {
     let Ok(pair) = value.cast::<PyTuple>() else {
         let block = integer_block(value, argument, &[("#F", None), ("3", Some(3))])?;
-        return Ok(Polygons {
-            sizes: vec![3; block.shape[0]],
-            corners: block.data,
-        });
+        return Ok(Polygons { sizes: vec![3; block.shape[0]], corners: block.data });
     };
     if pair.len() != 2 {
         let found = pair.len();
@@ -186,18 +155,10 @@ pub(crate) fn polygons(value: &Bound<'_, PyAny>, argument: &str) -> PyResult<Pol
             "{argument} must be an array (#F, 3) or a pair (corner indices, face sizes), found a tuple of {found}"
         )));
     }
-    let corners = integers(
-        &pair.get_item(0)?,
-        &format!("{argument}[0] (corner indices)"),
-    )?;
+    let corners = integers(&pair.get_item(0)?, &format!("{argument}[0] (corner indices)"))?;
     let sizes = integers(&pair.get_item(1)?, &format!("{argument}[1] (face sizes)"))?;
-    let sizes: Vec<usize> = sizes
-        .iter()
-        .filter_map(|&size| usize::try_from(size).ok())
-        .collect();
-    let total = sizes
-        .iter()
-        .try_fold(0usize, |sum, &size| sum.checked_add(size));
+    let sizes: Vec<usize> = sizes.iter().filter_map(|&size| usize::try_from(size).ok()).collect();
+    let total = sizes.iter().try_fold(0usize, |sum, &size| sum.checked_add(size));
     if total != Some(corners.len()) {
         let found = corners.len();
         return Err(ArrayError::new_err(format!(
@@ -208,18 +169,10 @@ pub(crate) fn polygons(value: &Bound<'_, PyAny>, argument: &str) -> PyResult<Pol
 }
 
 /// Skin weights: `#M by #J`, or a triple (indptr, indices, data).
-pub(crate) fn weights(
-    value: &Bound<'_, PyAny>,
-    vertices: usize,
-    joints: usize,
-) -> PyResult<SkinWeights> {
+pub(crate) fn weights(value: &Bound<'_, PyAny>, vertices: usize, joints: usize) -> PyResult<SkinWeights> {
     use crate::errors::OrRaise;
     let Ok(triple) = value.cast::<PyTuple>() else {
-        let block = floats(
-            value,
-            "skin_weights",
-            &[("#M", Some(vertices)), ("#J", Some(joints))],
-        )?;
+        let block = floats(value, "skin_weights", &[("#M", Some(vertices)), ("#J", Some(joints))])?;
         return SkinWeights::from_dense(&rows_of(block, "skin_weights")?).or_raise();
     };
     if triple.len() != 3 {
@@ -230,28 +183,18 @@ pub(crate) fn weights(
     }
     let indptr = integers(&triple.get_item(0)?, "skin_weights[0] (indptr)")?;
     let indices = integers(&triple.get_item(1)?, "skin_weights[1] (indices)")?;
-    let data = floats(
-        &triple.get_item(2)?,
-        "skin_weights[2] (data)",
-        &[("n", None)],
-    )?;
+    let data = floats(&triple.get_item(2)?, "skin_weights[2] (data)", &[("n", None)])?;
     SkinWeights::from_compressed(joints, &indptr, &indices, &data.data).or_raise()
 }
 
 /// A fresh `n by 3` array.
-pub(crate) fn from_points<'py>(
-    py: Python<'py>,
-    points: &[Point],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+pub(crate) fn from_points<'py>(py: Python<'py>, points: &[Point]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let flat: Vec<f64> = points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     PyArray1::from_vec(py, flat).reshape([points.len(), 3])
 }
 
 /// A fresh `n by 3` array from frame numbers.
-pub(crate) fn from_frame<'py>(
-    py: Python<'py>,
-    points: &[[f32; 3]],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+pub(crate) fn from_frame<'py>(py: Python<'py>, points: &[[f32; 3]]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let flat: Vec<f64> = points.iter().flatten().map(|x| f64::from(*x)).collect();
     PyArray1::from_vec(py, flat).reshape([points.len(), 3])
 }
@@ -275,31 +218,17 @@ impl<'py> Out<'py> {
         let found = value.cast::<PyUntypedArray>().map_err(|_| {
             ArrayError::new_err("out must be an array (n, 3) of float32 or float64 to write to")
         })?;
-        let shape: Shape = if found.ndim() == 1 {
-            &[("3n", None)]
-        } else {
-            &[("n", None), ("3", Some(3))]
-        };
+        let shape: Shape = if found.ndim() == 1 { &[("3n", None)] } else { &[("n", None), ("3", Some(3))] };
         let fits = found.shape().last().is_some_and(|last| last % 3 == 0);
-        if !fits
-            || found
-                .getattr("flags")?
-                .getattr("aligned")?
-                .extract::<bool>()?
-                == false
-        {
+        let aligned: bool = found.getattr("flags")?.getattr("aligned")?.extract()?;
+        if !fits || !aligned {
             return Err(refuse("out", FLOATS, shape, found));
         }
         array(value, "out", FLOATS, shape)?;
         let held = |_| ArrayError::new_err("out must be writable and not in use elsewhere");
         match found.cast::<PyArrayDyn<f32>>() {
             Ok(single) => Ok(Self::Single(single.try_readwrite().map_err(held)?)),
-            Err(_) => Ok(Self::Double(
-                found
-                    .cast::<PyArrayDyn<f64>>()?
-                    .try_readwrite()
-                    .map_err(held)?,
-            )),
+            Err(_) => Ok(Self::Double(found.cast::<PyArrayDyn<f64>>()?.try_readwrite().map_err(held)?)),
         }
     }
 
@@ -322,11 +251,7 @@ pub(crate) enum OutView<'a> {
 
 impl OutView<'_> {
     /// Writes `points[start..]` until the array is full.
-    pub(crate) fn write<T: Into<f64> + Copy>(
-        self,
-        points: &[[T; 3]],
-        start: usize,
-    ) -> PyResult<()> {
+    pub(crate) fn write<T: Into<f64> + Copy>(self, points: &[[T; 3]], start: usize) -> PyResult<()> {
         match self {
             Self::Single(view) => fill(view, points, start, |x| x.into() as f32),
             Self::Double(view) => fill(view, points, start, Into::into),
@@ -341,25 +266,16 @@ fn fill<T: Element, S: Copy>(
     convert: impl Fn(S) -> T,
 ) -> PyResult<()> {
     let rows = view.len() / 3;
-    let source = start
-        .checked_add(rows)
-        .and_then(|end| points.get(start..end))
-        .ok_or_else(|| {
-            let all = points.len();
-            ArrayError::new_err(format!(
-                "out has {rows} rows to fill from row {start} on, but there are {all} rows"
-            ))
-        })?;
+    let source = start.checked_add(rows).and_then(|end| points.get(start..end)).ok_or_else(|| {
+        let all = points.len();
+        ArrayError::new_err(format!(
+            "out has {rows} rows to fill from row {start} on, but there are {all} rows"
+        ))
+    })?;
     let numbers = source.iter().flatten();
     match view.as_slice_mut() {
-        Some(slice) => slice
-            .iter_mut()
-            .zip(numbers)
-            .for_each(|(out, x)| *out = convert(*x)),
-        None => view
-            .iter_mut()
-            .zip(numbers)
-            .for_each(|(out, x)| *out = convert(*x)),
+        Some(slice) => slice.iter_mut().zip(numbers).for_each(|(out, x)| *out = convert(*x)),
+        None => view.iter_mut().zip(numbers).for_each(|(out, x)| *out = convert(*x)),
     }
     Ok(())
 }

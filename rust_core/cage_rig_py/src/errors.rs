@@ -5,36 +5,11 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-create_exception!(
-    cage_rig_core,
-    CageRigError,
-    PyValueError,
-    "Something handed to the core is not usable."
-);
-create_exception!(
-    cage_rig_core,
-    CageError,
-    CageRigError,
-    "A mesh cannot serve as a cage."
-);
-create_exception!(
-    cage_rig_core,
-    SkinError,
-    CageRigError,
-    "A mesh cannot serve as a skin."
-);
-create_exception!(
-    cage_rig_core,
-    WeightsError,
-    CageRigError,
-    "Weights cannot bind a skin to joints."
-);
-create_exception!(
-    cage_rig_core,
-    SkeletonError,
-    CageRigError,
-    "Joints and parents are no skeleton."
-);
+create_exception!(cage_rig_core, CageRigError, PyValueError, "Something handed to the core is not usable.");
+create_exception!(cage_rig_core, CageError, CageRigError, "A mesh cannot serve as a cage.");
+create_exception!(cage_rig_core, SkinError, CageRigError, "A mesh cannot serve as a skin.");
+create_exception!(cage_rig_core, WeightsError, CageRigError, "Weights cannot bind a skin to joints.");
+create_exception!(cage_rig_core, SkeletonError, CageRigError, "Joints and parents are no skeleton.");
 create_exception!(
     cage_rig_core,
     PoseError,

@@ -36,18 +36,10 @@ fn check_cage<'py>(
     let vertices = arrays::points(cage_vertices, "cage_vertices", ("#C", None))?;
     let faces = arrays::polygons(cage_faces, "cage_faces")?;
     let cage = py.detach(|| Cage::new(vertices, &faces)).or_raise()?;
-    let corners: Vec<i64> = cage
-        .triangles()
-        .iter()
-        .flatten()
-        .map(|&v| i64::from(v))
-        .collect();
+    let corners: Vec<i64> = cage.triangles().iter().flatten().map(|&v| i64::from(v)).collect();
     let found = PyDict::new(py);
     found.set_item("turned", cage.turned())?;
-    found.set_item(
-        "triangles",
-        PyArray1::from_vec(py, corners).reshape([cage.triangles().len(), 3])?,
-    )?;
+    found.set_item("triangles", PyArray1::from_vec(py, corners).reshape([cage.triangles().len(), 3])?)?;
     Ok(found)
 }
 

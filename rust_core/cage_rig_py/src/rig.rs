@@ -26,15 +26,8 @@ impl CoupledRig {
         py: Python<'_>,
         work: impl FnOnce(&mut cage_rig::CoupledRig) -> R + Send,
     ) -> PyResult<R> {
-        py.detach(|| {
-            self.rig
-                .lock()
-                .map(|mut rig| work(&mut rig))
-                .map_err(|_| ())
-        })
-        .map_err(|()| {
-            CageRigError::new_err("an internal error has left this rig unusable; bind again")
-        })
+        py.detach(|| self.rig.lock().map(|mut rig| work(&mut rig)).map_err(|_| ()))
+            .map_err(|()| CageRigError::new_err("an internal error has left this rig unusable; bind again"))
     }
 
     fn cage(&self, cage: &Bound<'_, PyAny>) -> PyResult<Vec<Point>> {
@@ -42,9 +35,7 @@ impl CoupledRig {
     }
 
     fn rest_joints(&self, joints: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<Point>>> {
-        joints
-            .map(|joints| arrays::points(joints, "rest_joints", ("#J", Some(self.joints))))
-            .transpose()
+        joints.map(|joints| arrays::points(joints, "rest_joints", ("#J", Some(self.joints)))).transpose()
     }
 }
 
@@ -75,20 +66,12 @@ impl CoupledRig {
         let skin = arrays::points(skin_vertices, "skin_vertices", ("#M", None))?;
         let cage = arrays::points(cage_vertices, "cage_vertices", ("#C", None))?;
         let joints = arrays::points(joints, "joints", ("#J", None))?;
-        let (m, c, j) = (
-            ("#M", Some(skin.len())),
-            ("#C", Some(cage.len())),
-            ("#J", Some(joints.len())),
-        );
+        let (m, c, j) = (("#M", Some(skin.len())), ("#C", Some(cage.len())), ("#J", Some(joints.len())));
         let matrix = |value: Option<&Bound<'_, PyAny>>, name, shape| {
-            value
-                .map(|value| arrays::matrix(value, name, shape))
-                .transpose()
+            value.map(|value| arrays::matrix(value, name, shape)).transpose()
         };
         let known = Known {
-            anchors: anchors
-                .map(|anchors| arrays::integers(anchors, "anchors"))
-                .transpose()?,
+            anchors: anchors.map(|anchors| arrays::integers(anchors, "anchors")).transpose()?,
             cage_coords: matrix(cage_coords, "cage_coords", [m, c])?,
             joint_coords: matrix(joint_coords, "joint_coords", [j, c])?,
             center_coords: matrix(center_coords, "center_coords", [m, c])?,
@@ -106,18 +89,10 @@ impl CoupledRig {
             known,
             options: read_options(options)?,
         };
-        let (skin_vertices, joints, cage_vertices) = (
-            input.skin_vertices.len(),
-            input.skeleton.len(),
-            input.cage.vertices().len(),
-        );
+        let (skin_vertices, joints, cage_vertices) =
+            (input.skin_vertices.len(), input.skeleton.len(), input.cage.vertices().len());
         let rig = py.detach(|| cage_rig::CoupledRig::new(input)).or_raise()?;
-        Ok(Self {
-            rig: Mutex::new(rig),
-            joints,
-            cage_vertices,
-            skin_vertices,
-        })
+        Ok(Self { rig: Mutex::new(rig), joints, cage_vertices, skin_vertices })
     }
 
     /// The bones move: transforms (#J, 4, 4) measured at rest_joints (default: those of the bind).
@@ -130,8 +105,7 @@ impl CoupledRig {
     ) -> PyResult<()> {
         let transforms = arrays::transforms(transforms, self.joints)?;
         let rest_joints = self.rest_joints(rest_joints)?;
-        self.with(py, |rig| rig.pose(&transforms, rest_joints.as_deref()))?
-            .or_raise()
+        self.with(py, |rig| rig.pose(&transforms, rest_joints.as_deref()))?.or_raise()
     }
 
     /// The artist moves the rest cage to cage (#C, 3).
@@ -158,31 +132,20 @@ impl CoupledRig {
         let cage = self.cage(cage)?;
         let transforms = arrays::transforms(transforms, self.joints)?;
         let rest_joints = self.rest_joints(rest_joints)?;
-        self.with(py, |rig| {
-            rig.play(&cage, &transforms, rest_joints.as_deref())
-        })?
-        .or_raise()
+        self.with(py, |rig| rig.play(&cage, &transforms, rest_joints.as_deref()))?.or_raise()
     }
 
     /// Moves the visible skin at rest by offsets (#M, 3), or not at all (None).
     #[pyo3(signature = (offsets))]
     fn offset_rest_skin(&self, py: Python<'_>, offsets: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let rows = ("#M", Some(self.skin_vertices));
-        let offsets = offsets
-            .map(|offsets| arrays::points(offsets, "offsets", rows))
-            .transpose()?;
-        self.with(py, |rig| rig.offset_rest_skin(offsets.as_deref()))?
-            .or_raise()
+        let offsets = offsets.map(|offsets| arrays::points(offsets, "offsets", rows)).transpose()?;
+        self.with(py, |rig| rig.offset_rest_skin(offsets.as_deref()))?.or_raise()
     }
 
     /// Writes rows of the posed skin, from row start on, into out (n, 3) or flat.
     #[pyo3(signature = (out, start=0))]
-    fn posed_skin_into(
-        &self,
-        py: Python<'_>,
-        out: &Bound<'_, PyAny>,
-        start: usize,
-    ) -> PyResult<()> {
+    fn posed_skin_into(&self, py: Python<'_>, out: &Bound<'_, PyAny>, start: usize) -> PyResult<()> {
         let mut out = Out::new(out)?;
         let view = out.view();
         self.with(py, |rig| view.write(rig.posed_skin(), start))?
@@ -274,9 +237,7 @@ impl CoupledRig {
     #[getter]
     fn center_coords<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let coords = self.with(py, |rig| rig.center_coords().cloned())?;
-        coords
-            .map(|coords| arrays::from_rows(py, &coords))
-            .transpose()
+        coords.map(|coords| arrays::from_rows(py, &coords)).transpose()
     }
 
     /// Anchor skin vertices.
@@ -331,12 +292,7 @@ impl CoupledRig {
     }
 
     fn __repr__(&self) -> String {
-        let Self {
-            skin_vertices,
-            joints,
-            cage_vertices,
-            ..
-        } = self;
+        let Self { skin_vertices, joints, cage_vertices, .. } = self;
         format!("<CoupledRig: {skin_vertices} skin vertices, {joints} joints, {cage_vertices} cage vertices>")
     }
 }

@@ -6,9 +6,10 @@
 //! `#points · (#edges + #faces)`. Defined inside, on and outside a closed mesh.
 //!
 //! We differ from the paper where it is unstable: on the surface the distance decides (not an
-//! angle), a face seen edge-on is computed from its spherical excess ([`thin_weights`]), and what
+//! angle), a face seen edge-on has formulas without cancellation (`degenerate.rs`), and what
 //! rounding leaves of linear precision is corrected by the smallest change ([`Correction`]).
 
+use super::degenerate::Seen;
 use crate::cage::Cage;
 use crate::points::{bounding_diagonal, Matrix3, Point};
 use crate::rows::Rows;
@@ -50,10 +51,12 @@ struct Face {
     double_area: f64,
 }
 
-/// What is known of an edge from one point: u_a × u_b, half the angle along it, the angle.
+/// What is known of an edge from one point: u_a × u_b and its length, half the angle along it, the
+/// angle.
 #[derive(Clone, Copy)]
 struct Side {
     cross: Point,
+    sine: f64,
     half: Point,
     angle: f64,
 }
@@ -135,7 +138,9 @@ impl<'a> Surface<'a> {
         for &[a, b] in &self.edges {
             let (a, b) = (a as usize, b as usize);
             let (from, to) = (scratch.directions[a], scratch.directions[b]);
-            let (cross, cosine) = (from.cross(&to), from.dot(&to));
+            // Not u_a × u_b: the difference is exact where the two are close.
+            let cosine = from.dot(&to);
+            let cross = if cosine > 0.5 { from.cross(&(to - from)) } else { from.cross(&to) };
             let sine = cross.norm();
             if cosine < 0.0 {
                 let (near, far) = (scratch.distances[a], scratch.distances[b]);
@@ -147,7 +152,7 @@ impl<'a> Surface<'a> {
             }
             let angle = sine.atan2(cosine);
             let ratio = if sine > 0.0 { angle / sine } else { 1.0 };
-            scratch.sides.push(Side { cross, half: cross * (0.5 * ratio), angle });
+            scratch.sides.push(Side { cross, sine, half: cross * (0.5 * ratio), angle });
         }
         false
     }
@@ -157,7 +162,10 @@ impl<'a> Surface<'a> {
         let sides = face.edges.map(|e| scratch.sides[e]);
         let distances = face.corners.map(|v| scratch.distances[v]);
         let crosses: [Point; 3] = std::array::from_fn(|k| sides[k].cross * face.signs[k]);
-        let determinant = scratch.directions[face.corners[0]].dot(&crosses[0]);
+        let sines = sides.map(|s| s.sine);
+        // The determinant is most exact from the shortest side.
+        let short = (0..3).min_by(|&i, &k| sines[i].total_cmp(&sines[k])).unwrap_or(0);
+        let determinant = scratch.directions[face.corners[short]].dot(&crosses[short]);
         let height = determinant.abs() * distances[0] * distances[1] * distances[2] / face.double_area;
         // Cosines of the angles between the sides at each corner, up to a positive factor.
         let turns: [f64; 3] = std::array::from_fn(|k| -crosses[(k + 1) % 3].dot(&crosses[(k + 2) % 3]));
@@ -172,40 +180,20 @@ impl<'a> Surface<'a> {
             (0..3).for_each(|k| row[face.corners[k]] = areas[k] / areas.iter().sum::<f64>());
             return true;
         }
-        let sines = crosses.map(|c| c.norm());
-        let components = thin_weights(&sides.map(|s| s.angle), &sines, &turns, determinant).unwrap_or_else(|| {
+        let seen = Seen {
+            directions: face.corners.map(|v| scratch.directions[v]),
+            angles: sides.map(|s| s.angle),
+            sines,
+            turns,
+            determinant,
+        };
+        let components = seen.degenerate_components(short).unwrap_or_else(|| {
             let mean: Point = (0..3).map(|k| sides[k].half * face.signs[k]).sum();
             crosses.map(|cross| mean.dot(&cross) / determinant)
         });
         (0..3).for_each(|k| row[face.corners[k]] += components[k] / distances[k]);
         false
     }
-}
-
-/// The components of the mean vector of a spherical triangle that is nearly an arc, corner A on
-/// side a opposite it: `(θ_i − cos α_j θ_k − cos α_k θ_j) · sin θ_i / 2 det` [JSW05], with the
-/// differences that cancel there taken from det² = 4 sin h sin(h − a) sin(h − b) sin(h − c).
-/// `None` for any other triangle.
-fn thin_weights(angles: &[f64; 3], sines: &[f64; 3], turns: &[f64; 3], determinant: f64) -> Option<[f64; 3]> {
-    let a = (0..3).find(|&k| turns[k] < 0.0 && turns[(k + 1) % 3] > 0.0 && turns[(k + 2) % 3] > 0.0)?;
-    let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-    let corner_sine = |i: usize, j: usize| determinant.abs() / (sines[i] * sines[j]);
-    let (sine_a, sine_b, sine_c) = (corner_sine(b, c), corner_sine(a, c), corner_sine(a, b));
-    if sine_b.max(sine_c).max(sine_a) > 0.03 {
-        return None;
-    }
-    // 1 − |cos α| of each corner.
-    let from_flat = |sine: f64| sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
-    let (flat_a, flat_b, flat_c) = (from_flat(sine_a), from_flat(sine_b), from_flat(sine_c));
-    let half = 0.5 * (angles[0] + angles[1] + angles[2]);
-    let others = half.sin() * (half - angles[b]).sin() * (half - angles[c]).sin();
-    let excess = 2.0 * (determinant * determinant / (4.0 * others)).asin(); // θ_b + θ_c − θ_a
-    let mut numerators = [0.0; 3];
-    numerators[a] = flat_b * angles[c] + flat_c * angles[b] - excess;
-    numerators[b] = excess - flat_a * angles[c] + flat_c * angles[a];
-    numerators[c] = excess - flat_a * angles[b] + flat_b * angles[a];
-    let components = std::array::from_fn(|k| numerators[k] * sines[k] / (2.0 * determinant));
-    components.iter().all(|x: &f64| x.is_finite()).then_some(components)
 }
 
 /// The smallest change of a row that makes it reproduce its point.

@@ -3,9 +3,12 @@
 //! A kind of coordinates is a record in [`KINDS`]. Every kind gives rows that sum to 1 and
 //! reproduce the point they belong to (linear precision): `Φ C₀ = M₀`.
 
+mod degenerate;
 pub mod mean_value;
 #[cfg(test)]
 mod naive;
+#[cfg(test)]
+mod tests;
 
 use crate::cage::Cage;
 use crate::error::Error;

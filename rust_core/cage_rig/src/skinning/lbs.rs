@@ -20,7 +20,8 @@ pub fn pose(input: &SkinningInput, posed: &mut [[f32; 3]]) {
     let pose_chunk = |(index, chunk_out): (usize, &mut [[f32; 3]])| {
         let first = index * chunk;
         for (i, out) in chunk_out.iter_mut().enumerate() {
-            let range = input.weights.starts[first + i] as usize..input.weights.starts[first + i + 1] as usize;
+            let range =
+                input.weights.starts[first + i] as usize..input.weights.starts[first + i + 1] as usize;
             *out = displaced(&bones, &input.weights.influences[range], input.rest_skin[first + i]);
         }
     };
@@ -44,7 +45,9 @@ fn displaced(bones: &[[f32; 12]], influences: &[(u32, f32)], v: [f32; 3]) -> [f3
         let bone = &bones[joint as usize];
         blend.iter_mut().zip(bone).for_each(|(sum, x)| *sum += weight * x);
     }
-    std::array::from_fn(|d| v[d] + (blend[d] * v[0] + blend[3 + d] * v[1] + blend[6 + d] * v[2] + blend[9 + d]))
+    std::array::from_fn(|d| {
+        v[d] + (blend[d] * v[0] + blend[3 + d] * v[1] + blend[6 + d] * v[2] + blend[9 + d])
+    })
 }
 
 /// The same in double precision, for anchors and cage: `points` (`#P by 3`) moved by rows of Ω.
@@ -59,7 +62,8 @@ fn displacement_at(transforms: &[Transform], influences: &[(u32, f64)], v: &Poin
 /// The linear part of the blend: R̃ = Σ_j ω_ij R_j + (1 − Σ_j ω_ij) I, one per row of Ω.
 pub fn blended_linear(linear: &[Matrix3], weights: &SkinWeights) -> Vec<Matrix3> {
     let blend = |row: &[(u32, f64)]| {
-        let moved: Matrix3 = row.iter().map(|&(joint, weight)| weight * (linear[joint as usize] - Matrix3::identity())).sum();
+        let moved: Matrix3 =
+            row.iter().map(|&(joint, weight)| weight * (linear[joint as usize] - Matrix3::identity())).sum();
         Matrix3::identity() + moved
     };
     (0..weights.len()).map(|i| blend(weights.row(i))).collect()

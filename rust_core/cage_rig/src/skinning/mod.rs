@@ -7,6 +7,8 @@
 pub mod lbs;
 #[cfg(test)]
 pub(crate) mod naive;
+#[cfg(test)]
+mod tests;
 
 use crate::error::Error;
 use crate::points::Transform;
@@ -60,7 +62,9 @@ impl PackedWeights {
     pub fn new(weights: &SkinWeights) -> Self {
         let mut packed = Self { starts: vec![0], influences: Vec::new() };
         for vertex in 0..weights.len() {
-            packed.influences.extend(weights.row(vertex).iter().map(|&(joint, weight)| (joint, weight as f32)));
+            packed
+                .influences
+                .extend(weights.row(vertex).iter().map(|&(joint, weight)| (joint, weight as f32)));
             packed.starts.push(packed.influences.len() as u32);
         }
         packed

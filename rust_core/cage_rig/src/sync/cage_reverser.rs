@@ -30,7 +30,11 @@ pub struct CageReverser {
 
 impl CageReverser {
     /// Assembles and factors Eq. (19) for `linear` (R_j, one per joint).
-    pub fn new(cage: &CageUpdater, skeleton: &SkeletonUpdater, linear: &[Matrix3]) -> Result<Self, PoseError> {
+    pub fn new(
+        cage: &CageUpdater,
+        skeleton: &SkeletonUpdater,
+        linear: &[Matrix3],
+    ) -> Result<Self, PoseError> {
         let gradient = skeleton.translation_gradient(linear);
         let mut at_anchors = weighted_gradient(cage.anchor_weights(), &gradient);
         let coords = cage.anchor_coords();

@@ -39,7 +39,12 @@ pub struct SkinAtRest<'a> {
 }
 
 /// Ψ of `joints` (`#J by 3`). `exponent` is s of Eq. (9).
-pub fn joint_coordinates(cage: &Cage, skin: &SkinAtRest, joints: &[Point], exponent: f64) -> JointCoordinates {
+pub fn joint_coordinates(
+    cage: &Cage,
+    skin: &SkinAtRest,
+    joints: &[Point],
+    exponent: f64,
+) -> JointCoordinates {
     let surface = Surface::new(skin.vertices, skin.triangles);
     let found: Vec<_> = (0..joints.len())
         .into_par_iter()
@@ -100,4 +105,21 @@ pub fn joint_locality(weights: &SkinWeights, joint: usize, exponent: f64) -> Vec
         .filter_map(|vertex| own(vertex).map(|w| (vertex, w)))
         .map(|(vertex, w)| (vertex, -1.0 + w.powf(exponent) + (1.0 - w).max(0.0).powf(exponent)))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn locality_is_high_where_bones_blend_and_nowhere_else() {
+        let dense = [1.0, 0.0, 0.5, 0.5, 0.9, 0.1, 0.0, 1.0, 0.0, 0.0];
+        let weights = SkinWeights::from_dense(&Rows::from_vec(5, 2, dense.to_vec()).expect("five rows"));
+        let found = joint_locality(&weights.expect("valid weights"), 0, 0.1);
+        // L = −1 + ω^s + (1 − ω)^s, by hand; rows 3 and 4 have no weight for joint 0.
+        let expected =
+            [(0, 0.0), (1, 2.0 * 0.5f64.powf(0.1) - 1.0), (2, 0.9f64.powf(0.1) + 0.1f64.powf(0.1) - 1.0)];
+        assert_eq!(found.len(), 3);
+        assert!(found.iter().zip(&expected).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-12));
+    }
 }

@@ -13,6 +13,8 @@ const ITERATIONS: usize = 200;
 const TOLERANCE: f64 = 1e-13;
 /// What still counts as solved when rounding stops the descent.
 const ACCEPTED: f64 = 1e-10;
+/// Added to the Hessian of the unit-sized problem.
+const DAMPING: f64 = 1e-12;
 /// The smallest mass relative to the largest: every cage vertex can be reached.
 const SMALLEST_MASS: f64 = 1e-12;
 
@@ -46,8 +48,7 @@ pub fn max_entropy_coordinates(cage: &[Point], point: &Point, masses: &[f64]) ->
         iterations += 1;
     }
     let inside = state.gradient.norm() <= ACCEPTED;
-    let mut coords = if inside { state.coords } else { normalised(masses) };
-    restore(&arms, &mut coords);
+    let coords = if inside { state.coords } else { closest_affine(&arms, normalised(masses)) };
     let residual = coords.iter().zip(cage).map(|(b, c)| *b * (c - point)).sum::<Point>().norm();
     MaxEntropy { coords, inside, residual, iterations }
 }
@@ -67,21 +68,23 @@ fn evaluate(arms: &[Point], masses: &[f64], slope: &Point) -> Dual {
     let total: f64 = coords.iter().sum();
     coords.iter_mut().for_each(|b| *b /= total);
     let gradient: Point = coords.iter().zip(arms).map(|(b, arm)| *b * arm).sum();
-    let hessian = coords.iter().zip(arms).map(|(b, arm)| *b * (arm - gradient) * (arm - gradient).transpose()).sum();
+    let hessian =
+        coords.iter().zip(arms).map(|(b, arm)| *b * (arm - gradient) * (arm - gradient).transpose()).sum();
     Dual { value: highest + total.ln(), gradient, hessian, coords }
 }
 
 /// One Newton step, halved until the dual falls enough (Armijo). `None` when it cannot fall.
 fn descend(arms: &[Point], masses: &[f64], slope: &Point, at: &Dual) -> Option<(Point, Dual)> {
-    let damping = 1e-14 * at.hessian.trace();
-    let step = -(at.hessian + Matrix3::identity() * damping).try_inverse()? * at.gradient;
+    // The Hessian vanishes while one vertex has nearly all the mass: the step is then along the gradient.
+    let step = -(at.hessian + Matrix3::identity() * DAMPING).try_inverse()? * at.gradient;
     let descent = at.gradient.dot(&step);
     let mut length = 1.0;
     for _ in 0..60 {
         let next_slope = slope + length * step;
         let next = evaluate(arms, masses, &next_slope);
         // Near the minimum the value stands still in rounding; the gradient still tells.
-        if next.value <= at.value + 1e-4 * length * descent || next.gradient.norm() < 0.5 * at.gradient.norm() {
+        if next.value <= at.value + 1e-4 * length * descent || next.gradient.norm() < 0.5 * at.gradient.norm()
+        {
             return Some((next_slope, next));
         }
         length *= 0.5;
@@ -100,16 +103,81 @@ fn normalised(mut masses: Vec<f64>) -> Vec<f64> {
     masses
 }
 
-/// The least-squares change that makes both constraints exact.
-fn restore(arms: &[Point], coords: &mut [f64]) {
+/// The affine coordinates with the least squared distance to `masses`: Σ b_k = 1 is kept, and the
+/// change is affine in c_k.
+fn closest_affine(arms: &[Point], mut masses: Vec<f64>) -> Vec<f64> {
+    let middle = arms.iter().sum::<Point>() / arms.len() as f64;
+    let spread: Matrix3 = arms.iter().map(|arm| (arm - middle) * (arm - middle).transpose()).sum();
+    let Some(inverse) = spread.try_inverse() else { return masses };
+    // Twice: the second pass takes away what rounding left of the first.
     for _ in 0..2 {
-        let excess = 1.0 - coords.iter().sum::<f64>();
-        coords.iter_mut().for_each(|b| *b += excess / arms.len() as f64);
-        let middle = arms.iter().sum::<Point>() / arms.len() as f64;
-        let spread: Matrix3 = arms.iter().map(|arm| (arm - middle) * (arm - middle).transpose()).sum();
-        let miss: Point = coords.iter().zip(arms).map(|(b, arm)| *b * arm).sum();
-        let Some(inverse) = spread.try_inverse() else { return };
+        let miss: Point = masses.iter().zip(arms).map(|(b, arm)| *b * arm).sum();
         let change = inverse * miss;
-        coords.iter_mut().zip(arms).for_each(|(b, arm)| *b -= change.dot(&(arm - middle)));
+        masses.iter_mut().zip(arms).for_each(|(b, arm)| *b -= change.dot(&(arm - middle)));
+        let excess = (masses.iter().sum::<f64>() - 1.0) / arms.len() as f64;
+        masses.iter_mut().for_each(|b| *b -= excess);
+    }
+    masses
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{random::Random, shapes::icosphere};
+
+    fn solve(point: Point, masses: &[f64]) -> (MaxEntropy, f64) {
+        let (cage, _) = icosphere(1);
+        let found = max_entropy_coordinates(&cage, &point, masses);
+        assert!((found.coords.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        let place: Point = found.coords.iter().zip(&cage).map(|(b, c)| *b * c).sum();
+        let miss = (place - point).norm();
+        assert!((miss - found.residual).abs() < 1e-12);
+        (found, miss)
+    }
+
+    #[test]
+    fn inside_the_hull_both_constraints_hold_whatever_the_masses() {
+        let mut random = Random::new(6);
+        for round in 0..200 {
+            let masses: Vec<f64> = (0..42).map(|_| 10f64.powf(random.between(-12.0, 0.0))).collect();
+            let (found, miss) = solve(random.point() * 0.5, &masses);
+            assert!(found.inside && miss < 1e-12, "round {round}: {miss:e} after {}", found.iterations);
+            assert!(found.coords.iter().all(|b| *b > -1e-15));
+        }
+    }
+
+    #[test]
+    fn masses_that_already_fit_are_kept() {
+        let mut masses = vec![0.5; 42];
+        masses[3] = 7.0;
+        let (cage, _) = icosphere(1);
+        let total: f64 = masses.iter().sum();
+        let center: Point = masses.iter().zip(&cage).map(|(m, c)| *m / total * c).sum();
+        let (found, _) = solve(center, &masses);
+        assert!(found.coords.iter().zip(&masses).all(|(b, m)| (b - m / total).abs() < 1e-13));
+    }
+
+    #[test]
+    fn of_all_coordinates_the_ones_nearest_to_the_masses_are_found() {
+        let (cage, _) = icosphere(1);
+        let masses: Vec<f64> = (0..42).map(|k| 1.0 + (k as f64).sin()).collect();
+        let (found, _) = solve(Point::new(0.2, -0.3, 0.4), &masses);
+        // At the maximum ln(b_k / m_k) is affine in c_k.
+        let logs: Vec<f64> = found.coords.iter().zip(&masses).map(|(b, m)| (b / m).ln()).collect();
+        let slope = Matrix3::from_rows(&[13, 20, 37].map(|k: usize| (cage[k] - cage[0]).transpose()))
+            .try_inverse()
+            .expect("four vertices in general position")
+            * Point::new(logs[13] - logs[0], logs[20] - logs[0], logs[37] - logs[0]);
+        for (log, c) in logs.iter().zip(&cage) {
+            assert!((log - logs[0] - slope.dot(&(c - cage[0]))).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn outside_the_hull_both_constraints_still_hold_and_it_is_said() {
+        for distance in [1.01, 1.5, 30.0] {
+            let (found, miss) = solve(Point::new(0.0, distance, 0.3), &[1.0; 42]);
+            assert!(!found.inside && miss < 1e-12, "{miss:e}");
+        }
     }
 }

@@ -133,7 +133,9 @@ fn eliminate(mut work: Rows) -> Vec<(usize, usize)> {
     let mut pivots = Vec::with_capacity(work.columns());
     for column in 0..work.columns() {
         let entry = |i: usize| work.row(i)[column].abs();
-        let best = (0..work.len()).filter(|&i| free[i]).max_by(|&i, &k| entry(i).total_cmp(&entry(k)).then(k.cmp(&i)));
+        let best = (0..work.len())
+            .filter(|&i| free[i])
+            .max_by(|&i, &k| entry(i).total_cmp(&entry(k)).then(k.cmp(&i)));
         let Some(best) = best.filter(|&i| entry(i) > DEPENDENT) else { continue };
         free[best] = false;
         pivots.push((best, column));
@@ -141,7 +143,10 @@ fn eliminate(mut work: Rows) -> Vec<(usize, usize)> {
         for i in (0..work.len()).filter(|&i| free[i]) {
             let factor = work.row(i)[column] / pivot[column];
             if factor != 0.0 {
-                work.row_mut(i)[column..].iter_mut().zip(&pivot[column..]).for_each(|(x, p)| *x -= factor * p);
+                work.row_mut(i)[column..]
+                    .iter_mut()
+                    .zip(&pivot[column..])
+                    .for_each(|(x, p)| *x -= factor * p);
             }
         }
     }
@@ -184,7 +189,13 @@ fn largest(matrix: &Rows) -> (usize, usize, f64) {
         let row = matrix.row(i).iter().enumerate();
         row.fold((i, 0, -1.0), |best, (k, x)| if x.abs() > best.2 { (i, k, x.abs()) } else { best })
     };
-    let better = |a: (usize, usize, f64), b: (usize, usize, f64)| if b.2 > a.2 || (b.2 == a.2 && b.0 < a.0) { b } else { a };
+    let better = |a: (usize, usize, f64), b: (usize, usize, f64)| {
+        if b.2 > a.2 || (b.2 == a.2 && b.0 < a.0) {
+            b
+        } else {
+            a
+        }
+    };
     (0..matrix.len()).into_par_iter().with_min_len(512).map(in_row).reduce(|| (usize::MAX, 0, -1.0), better)
 }
 

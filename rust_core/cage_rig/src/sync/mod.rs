@@ -89,7 +89,7 @@ impl CoupledRig {
     /// Binds: everything is precomputed here.
     pub fn new(input: BindInput) -> Result<Self, Error> {
         let binding = Binding::new(input)?;
-        let joints = binding.skeleton_updater.skeleton().joints().to_vec();
+        let joints = binding.skeleton_updater.joints(binding.cage.vertices());
         let rest = binding.rest_skin.at_bind().to_vec();
         Ok(Self {
             rest_cage: binding.cage.vertices().to_vec(),
@@ -216,8 +216,9 @@ impl CoupledRig {
             let posed = self.binding.cage_updater.posed_cage(&next, &transforms);
             self.work.reverse_solves += 1;
             self.work.cage_fits += 1;
-            let next_miss = largest_distance(&posed, wanted) / bounding_diagonal(self.binding.cage.vertices());
-            if !(next_miss < 0.5 * miss) {
+            let next_miss =
+                largest_distance(&posed, wanted) / bounding_diagonal(self.binding.cage.vertices());
+            if next_miss.is_nan() || next_miss >= 0.5 * miss {
                 break;
             }
             (cage, reached, miss) = (next, posed, next_miss);
@@ -226,7 +227,11 @@ impl CoupledRig {
             }
         }
         self.reverser = Some(reverser);
-        if miss <= REACHED { Ok(cage) } else { Err(PoseError::Unreachable { miss }) }
+        if miss <= REACHED {
+            Ok(cage)
+        } else {
+            Err(PoseError::Unreachable { miss })
+        }
     }
 
     fn check_cage(&self, cage: &[Point]) -> Result<(), PoseError> {
@@ -353,5 +358,8 @@ impl CoupledRig {
 }
 
 fn largest_distance(a: &[Point], b: &[Point]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, |most, d| if d > most || d.is_nan() { d } else { most })
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, |most, d| if d > most || d.is_nan() { d } else { most })
 }

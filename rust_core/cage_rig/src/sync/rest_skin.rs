@@ -43,7 +43,8 @@ impl RestSkin {
             .filter(|&k| cage[k] != self.cage[k])
             .map(|k| (k, (cage[k] - self.cage[k]).map(|x| x as f32).into()))
             .collect();
-        let panel = |(index, out): (usize, &mut [[f32; 3]])| self.write_panel(index * PANEL, &moved, offsets, out);
+        let panel =
+            |(index, out): (usize, &mut [[f32; 3]])| self.write_panel(index * PANEL, &moved, offsets, out);
         if rest.len() < PARALLEL_FROM {
             rest.chunks_mut(PANEL).enumerate().for_each(panel);
         } else {
@@ -51,7 +52,13 @@ impl RestSkin {
         }
     }
 
-    fn write_panel(&self, first: usize, moved: &[(usize, [f32; 3])], offsets: Option<&[[f32; 3]]>, out: &mut [[f32; 3]]) {
+    fn write_panel(
+        &self,
+        first: usize,
+        moved: &[(usize, [f32; 3])],
+        offsets: Option<&[[f32; 3]]>,
+        out: &mut [[f32; 3]],
+    ) {
         let (mut x, mut y, mut z) = ([0.0f32; PANEL], [0.0f32; PANEL], [0.0f32; PANEL]);
         for (k, [dx, dy, dz]) in moved {
             let column = &self.columns[k * self.skin.len() + first..][..out.len()];

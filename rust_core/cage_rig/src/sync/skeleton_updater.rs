@@ -1,7 +1,7 @@
 //! SkelUp: the cage at rest moves the joints, and the transforms follow.
 //!
-//! Based on [CTL*20] §4.1–4.2. Joints: a = Ψ C, Eq. (13), in delta form a = a₀ + Ψ (C − C₀).
-//! Transforms: joint j stays attached to its parent, Eq. (16–17). Cost: `#J · #C` and `#J`.
+//! Based on [CTL*20] §4.1–4.2. Joints: a = Ψ C, Eq. (13). Transforms: joint j stays attached to its
+//! parent, Eq. (16–17). Cost: `#J · #C` and `#J`.
 //!
 //! The paper keeps only the rotation of each bone. We keep its linear part R_j and the step
 //! d_j = T_j(a_j) − T_parent(a_j) that the animation makes at the joint, so that root motion,
@@ -20,18 +20,17 @@ pub struct JointMotion {
     pub step: Point,
 }
 
-/// Ψ, a₀, C₀ and the hierarchy.
+/// Ψ and the hierarchy.
 #[derive(Debug, Clone)]
 pub struct SkeletonUpdater {
     skeleton: Skeleton,
     joint_coords: Rows,
-    cage: Vec<Point>,
 }
 
 impl SkeletonUpdater {
-    /// Keeps the skeleton and `cage` (C₀, `#C by 3`) of the bind and Ψ (`#J by #C`).
-    pub fn new(skeleton: Skeleton, joint_coords: Rows, cage: &[Point]) -> Self {
-        Self { skeleton, joint_coords, cage: cage.to_vec() }
+    /// Keeps the skeleton of the bind and Ψ (`#J by #C`).
+    pub fn new(skeleton: Skeleton, joint_coords: Rows) -> Self {
+        Self { skeleton, joint_coords }
     }
 
     /// The skeleton of the bind.
@@ -44,11 +43,9 @@ impl SkeletonUpdater {
         &self.joint_coords
     }
 
-    /// Rest joints a of `cage` (C, `#C by 3`): a = a₀ + Ψ (C − C₀), Eq. (13).
+    /// Rest joints a = Ψ C of `cage` (C, `#C by 3`), Eq. (13).
     pub fn joints(&self, cage: &[Point]) -> Vec<Point> {
-        let moved: Vec<Point> = cage.iter().zip(&self.cage).map(|(c, c0)| c - c0).collect();
-        let joints = self.skeleton.joints().iter().enumerate();
-        joints.map(|(j, a0)| a0 + self.joint_coords.combine(j, &moved)).collect()
+        self.joint_coords.times(cage)
     }
 
     /// Reads R_j and d_j from `transforms` measured at `rest_joints` (`#J by 3`).

@@ -1,1 +1,144 @@
+//! The parts of the cycle against their oracles and the reference.
 
+use super::cage_reverser::CageReverser;
+use super::cage_updater::CageUpdater;
+use super::maxvol::{maxvol, ratio_of, MaxVolOptions};
+use super::naive::{hierarchy, linear_parts, reverse_matrix, translation_gradient};
+use super::skeleton_updater::SkeletonUpdater;
+use crate::coordinates::mean_value::coordinates;
+use crate::fixtures::{self, arm, Fixture};
+use crate::linalg::Lu;
+use crate::points::Point;
+use crate::rows::Rows;
+use crate::skeleton::Skeleton;
+use crate::weights::SkinWeights;
+
+fn largest_difference(a: &Rows, b: &Rows) -> f64 {
+    assert_eq!((a.len(), a.columns()), (b.len(), b.columns()));
+    a.as_slice().iter().zip(b.as_slice()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn skeleton(fixture: &Fixture) -> Skeleton {
+    Skeleton::new(fixture.joints.clone(), &fixture.parents).expect("a valid skeleton")
+}
+
+fn parts(fixture: &Fixture) -> (CageUpdater, SkeletonUpdater) {
+    let cage = fixture.cage();
+    let coords = coordinates(&cage, &fixture.skin);
+    let anchors = maxvol(&coords, &MaxVolOptions::default()).rows;
+    let weights = SkinWeights::from_dense(&fixture.weights).expect("valid weights");
+    let joint_coords = fixture.rig().joint_coords().clone();
+    let cage_updater = CageUpdater::new(&anchors, &coords, &fixture.skin, &weights, cage.vertices(), 1e-3);
+    (cage_updater, SkeletonUpdater::new(skeleton(fixture), joint_coords))
+}
+
+#[test]
+fn the_walk_down_the_hierarchy_equals_the_inverted_matrix() {
+    for fixture in fixtures::all() {
+        let linear = linear_parts(&fixtures::lively_pose(&fixture, 1.0));
+        let (_, updater) = parts(&fixture);
+        let expected = translation_gradient(&skeleton(&fixture), &linear, updater.joint_coords());
+        for (j, row) in updater.translation_gradient(&linear).iter().enumerate() {
+            for (k, block) in row.iter().enumerate() {
+                for (d, e) in (0..9).map(|n| (n / 3, n % 3)) {
+                    assert!((block[(d, e)] - expected.row(3 * j + d)[3 * k + e]).abs() < 1e-12);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_reverser_solves_equation_19_as_printed() {
+    let fixture = fixtures::shapes::bar();
+    let linear = linear_parts(&fixtures::lively_pose(&fixture, 1.0));
+    let (cage, updater) = parts(&fixture);
+    assert_eq!(cage.attenuated(), 0);
+    let gradient = translation_gradient(&skeleton(&fixture), &linear, updater.joint_coords());
+    let system = reverse_matrix(&cage, &gradient, &linear);
+    let step = fixtures::nudged(&vec![Point::zeros(); fixture.cage.len()], 1.0, 5);
+    let expected = Lu::new(&system).solve_interleaved(&cage.anchor_coords().times(&step));
+    let found = CageReverser::new(&cage, &updater, &linear).expect("a solvable pose").solve(&step);
+    assert!(fixtures::distance(&found, &expected) < 1e-10);
+}
+
+#[test]
+fn an_attenuated_fit_keeps_the_cage_near_the_skinned_one() {
+    let fixture = fixtures::shapes::far_vertex();
+    let (cage, updater) = parts(&fixture);
+    assert!(cage.attenuated() > 0);
+    assert!(cage.condition() > 1e3);
+    let pose = fixtures::lively_pose(&fixture, 0.5);
+    let joints = updater.joints(&fixture.cage);
+    let transforms = updater.transforms(&updater.motions(&pose, &joints), &joints);
+    let posed = cage.posed_cage(&fixture.cage, &transforms);
+    assert!(fixtures::distance(&posed, &fixture.cage) < 5.0 * cage_size(&fixture));
+    let exact = CageUpdater::new(
+        fixture.rig().anchors(),
+        fixture.rig().cage_coords(),
+        &fixture.skin,
+        &SkinWeights::from_dense(&fixture.weights).expect("valid weights"),
+        &fixture.cage,
+        0.0,
+    );
+    // Eq. (8) as printed throws the far rings away from the character.
+    assert!(
+        fixtures::distance(&exact.posed_cage(&fixture.cage, &transforms), &fixture.cage)
+            > 100.0 * cage_size(&fixture)
+    );
+}
+
+fn cage_size(fixture: &Fixture) -> f64 {
+    crate::points::bounding_diagonal(&fixture.cage)
+}
+
+#[test]
+fn anchors_are_distinct_and_no_row_depends_on_them_by_more_than_the_limit() {
+    for fixture in fixtures::all() {
+        let coords = coordinates(&fixture.cage(), &fixture.skin);
+        let chosen = maxvol(&coords, &MaxVolOptions::default());
+        let mut rows = chosen.rows.clone();
+        rows.sort_unstable();
+        rows.dedup();
+        assert_eq!(rows.len(), fixture.skin.len().min(fixture.cage.len()), "{}", fixture.name);
+        assert!(chosen.ratio <= 1.05, "{}: {}", fixture.name, chosen.ratio);
+    }
+}
+
+#[test]
+fn dependent_columns_leave_enough_distinct_anchors() {
+    let mut coords = Rows::zeros(30, 5);
+    let mut random = fixtures::random::Random::new(4);
+    for i in 0..30 {
+        let row = coords.row_mut(i);
+        (row[0], row[1], row[3]) = (random.unit(), random.unit(), random.unit());
+        row[4] = row[0] + row[1]; // and column 2 stays 0
+    }
+    let chosen = maxvol(&coords, &MaxVolOptions::default());
+    let mut rows = chosen.rows.clone();
+    rows.sort_unstable();
+    rows.dedup();
+    assert_eq!(rows.len(), 5);
+    assert!(chosen.ratio <= 1.05);
+}
+
+#[test]
+fn hierarchy_and_anchors_equal_the_reference_on_the_arm() {
+    if !arm::is_here() {
+        return;
+    }
+    let fixture = arm::fixture();
+    let (turns, shape) = arm::open("poses").doubles("A_R");
+    let poses = arm::open("poses").poses("T_skin");
+    let topology = arm::open("bind").rows("Btopo");
+    for (pose, turns) in poses.iter().zip(turns.chunks(shape[1] * shape[2])) {
+        let (found_turns, found_topology) = hierarchy(&skeleton(&fixture), &linear_parts(pose));
+        let turns = Rows::from_vec(shape[1], shape[2], turns.to_vec()).expect("a matrix a pose");
+        assert!(largest_difference(&found_turns, &turns) < 1e-12);
+        assert!(largest_difference(&found_topology, &topology) < 1e-12);
+    }
+    let coords = coordinates(&fixture.cage(), &fixture.skin);
+    assert!(maxvol(&coords, &MaxVolOptions::default()).ratio <= 1.05);
+    let shipped: Vec<usize> = arm::anchors().iter().map(|&i| i as usize).collect();
+    assert!((ratio_of(&coords, &shipped) - 1.00014).abs() < 1e-4);
+}
