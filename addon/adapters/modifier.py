@@ -68,7 +68,7 @@ def add(skin: bpy.types.Object, rest_cage: bpy.types.Object, posed_cage: bpy.typ
     """Add our modifier to the skin at place `index` of its stack."""
     modifier = skin.modifiers.new(NAME, "NODES")
     modifier.node_group = node_group()
-    modifier.show_in_editmode = True
+    modifier.show_in_editmode = False  # there the base mesh is edited, and the feed can't be written
     connect(modifier, rest_cage, posed_cage)
     skin.modifiers.move(len(skin.modifiers) - 1, index)
 
