@@ -155,7 +155,7 @@ def outfit_parts() -> list[Part]:
             (-0.07, -0.04, 1.77),
             (0.07, 0.11, 1.91),
             cell=0.015,
-            material="White",
+            material="Trim",
             bones=("head",),
         ),
         *sided,

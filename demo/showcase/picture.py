@@ -174,6 +174,8 @@ def _compose(images: Sequence[Array]) -> Array:
         for x0, x1 in ((0.3, 7.85), (8.15, 15.7)):
             cover = _card(canvas.shape, (low, height - 0.18 * unit), (x0 * unit, x1 * unit), radius=0.16 * unit)
             canvas += cover[..., None] * (np.array([0.99, 0.992, 0.996]) - canvas) * 0.85
+    fade_rows = max(1, round(0.15 * width / WIDTH))
+    images[0][-fade_rows:] += (1.0 - images[0][-fade_rows:]) * np.linspace(0.0, 1.0, fade_rows)[:, None, None]
     return canvas * np.concatenate(images)
 
 
