@@ -21,6 +21,7 @@ __all__ = [
     "CageError",
     "CageRigError",
     "CoupledRig",
+    "PanicException",
     "PoseError",
     "SkeletonError",
     "SkinError",

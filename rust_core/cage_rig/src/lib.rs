@@ -11,6 +11,8 @@
 //! Matrices are written by what is moved (rows) and what moves it (columns); `#V by 3` is a list
 //! of points. Binding, joints and solves are `f64`; what is touched every frame is `f32`.
 
+#![allow(rustdoc::broken_intra_doc_links)] // [CTL*20] and its like are citations
+
 mod cage;
 pub mod coordinates;
 mod error;

@@ -5,6 +5,7 @@ use crate::rows::Rows;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
+use rayon::prelude::*;
 
 fn view(rows: &Rows) -> MatRef<'_, f64> {
     MatRef::from_row_major_slice(rows.as_slice(), rows.len(), rows.columns())
@@ -18,12 +19,23 @@ fn to_rows(matrix: MatRef<'_, f64>) -> Rows {
     rows
 }
 
+/// Rows of a product that one thread makes at a time.
+const PRODUCT_ROWS: usize = 1024;
+
 /// A · B.
 pub(crate) fn product(a: &Rows, b: &Rows) -> Rows {
     let mut out = Rows::zeros(a.len(), b.columns());
-    let shape = (out.len(), out.columns());
-    let target = MatMut::from_row_major_slice_mut(out.as_mut_slice(), shape.0, shape.1);
-    matmul(target, Accum::Replace, view(a), view(b), 1.0, Par::Seq);
+    if out.is_empty() || a.columns() == 0 {
+        return out;
+    }
+    let (inner, width) = (a.columns(), b.columns());
+    let blocks = out.as_mut_slice().par_chunks_mut(PRODUCT_ROWS * width);
+    blocks.zip(a.as_slice().par_chunks(PRODUCT_ROWS * inner)).for_each(|(out, a)| {
+        let rows = out.len() / width;
+        let left = MatRef::from_row_major_slice(a, rows, inner);
+        let target = MatMut::from_row_major_slice_mut(out, rows, width);
+        matmul(target, Accum::Replace, left, view(b), 1.0, Par::Seq);
+    });
     out
 }
 

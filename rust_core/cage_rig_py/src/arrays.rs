@@ -134,7 +134,8 @@ pub(crate) fn transforms(value: &Bound<'_, PyAny>, joints: usize) -> PyResult<Ve
     let shape = [("#J", Some(joints)), ("4", Some(4)), ("4", Some(4))];
     let block = finite_floats(value, "transforms", &shape)?;
     let read = |(joint, m): (usize, &[f64])| {
-        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+        // Single-precision inverses leave some rounding here.
+        if m[12..].iter().zip([0.0, 0.0, 0.0, 1.0]).any(|(found, wanted)| (found - wanted).abs() > 1e-5) {
             return Err(crate::errors::raise(cage_rig::PoseError::NotAffine { joint }));
         }
         let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);

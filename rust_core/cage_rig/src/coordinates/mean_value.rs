@@ -7,7 +7,7 @@
 //!
 //! We differ from the paper where it is unstable: on the surface the distance decides (not an
 //! angle), a face seen edge-on has formulas without cancellation (`degenerate.rs`), and what
-//! rounding leaves of linear precision is corrected by the smallest change ([`Correction`]).
+//! rounding leaves of linear precision is corrected by the smallest change (`Correction`).
 
 use super::degenerate::Seen;
 use crate::cage::Cage;

@@ -143,13 +143,9 @@ impl Binding {
         let joint_coords = match checked(known.joint_coords, "joint_coords", joints, columns)? {
             Some(coords) => coords,
             None => {
-                let at_rest = SkinAtRest {
-                    vertices: &skin,
-                    triangles: &triangles,
-                    weights: &weights,
-                    cage_coords: &cage_coords,
-                };
-                let found = joint_coordinates(&cage, &at_rest, skeleton.joints(), options.locality_exponent);
+                let (vertices, triangles, weights, cage_coords) = (&skin, &triangles, &weights, &cage_coords);
+                let skin = SkinAtRest { vertices, triangles, weights, cage_coords };
+                let found = joint_coordinates(&cage, &skin, skeleton.joints(), options.locality_exponent);
                 report.joints_outside_hull = found.outside_hull;
                 report.unweighted_joints = found.without_locality;
                 found.coords

@@ -26,8 +26,12 @@ impl RestSkin {
     pub fn new(skin: &[Point], cage: &[Point], cage_coords: &Rows) -> Self {
         let count = skin.len();
         let mut columns = vec![0.0; count * cage.len()];
-        columns.par_chunks_mut(count.max(1)).enumerate().for_each(|(k, column)| {
-            column.iter_mut().enumerate().for_each(|(i, x)| *x = cage_coords.row(i)[k] as f32);
+        // Sixteen columns at a time: a row of Φ is read from memory once for all of them.
+        columns.par_chunks_mut(16 * count.max(1)).enumerate().for_each(|(block, columns)| {
+            for i in 0..count {
+                let entries = &cage_coords.row(i)[16 * block..];
+                columns[i..].iter_mut().step_by(count).zip(entries).for_each(|(x, phi)| *x = *phi as f32);
+            }
         });
         Self { skin: to_f32(skin), cage: cage.to_vec(), columns }
     }
