@@ -24,3 +24,16 @@ def modifier_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
         found = getattr(inputs, identifier, None)
         return None if found is None else found.value
     return modifier.get(identifier)
+
+
+def action_curves(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
+    """The curves of the action (and its slot) that animates `owner`: `action.fcurves` is gone in 5.0."""
+    data = owner.animation_data
+    if data is None or data.action is None:
+        return []
+    if hasattr(data.action, "fcurves"):
+        return list(data.action.fcurves)
+    slot = data.action_slot
+    strips = [strip for layer in data.action.layers for strip in layer.strips]
+    bags = [strip.channelbag(slot) for strip in strips] if slot is not None else []
+    return [curve for bag in bags if bag is not None for curve in bag.fcurves]

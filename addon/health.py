@@ -104,12 +104,22 @@ def follow_renames(cage: bpy.types.Object) -> str:
         return ""
     fresh = [bone for bone in bones if bone.name not in known]
     for joint in lost:
-        ends = np.array([*joint.head, *joint.tail])
-        same = [bone for bone in fresh if np.allclose([*bone.head_local, *bone.tail_local], ends, atol=1e-5)]
+        same = [bone for bone in fresh if _is_joint(bone, joint)]
         if len(same) != 1:
             return joint.name
         joint.name = same[0].name
     return ""
+
+
+def _is_joint(bone: bpy.types.Bone, joint: bpy.types.PropertyGroup) -> bool:
+    """Whether the bone is where the joint was bound (or was refit to) and points the same way."""
+    head = np.array(joint.head) + np.array(joint.shift)
+    along = np.array(joint.tail) - np.array(joint.head)
+    return np.allclose(bone.head_local, head, atol=1e-5) and np.allclose(
+        (bone.tail_local - bone.head_local).normalized(),
+        along / np.linalg.norm(along),
+        atol=1e-4,
+    )
 
 
 def bone_order(cage: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import props, sync
-from .adapters import armature, modifier, positions, snapshot, vertex_groups
+from .adapters import armature, modifier, positions, shape_keys, snapshot, vertex_groups
 from .session import Session, SessionError, SkinSnapshot, Snapshot
 
 Matrix = NDArray[np.float64]
@@ -97,6 +97,45 @@ def unbind(cage: bpy.types.Object) -> None:
             _remove_object(obj)
     cage.property_unset("cage_rig")
     sync.drop(cage)
+
+
+def apply_refit(context: bpy.types.Context, cage: bpy.types.Object) -> int:
+    """Move the armature's rest bones to the refit joints of a still cage; returns how many moved. Object Mode.
+
+    Orientations are kept, so that actions keep their meaning and the motion stays what it is; bones that leave their
+    parent's tail are disconnected. The rig stays bound as it was. Raises `BindError` with nothing changed.
+    """
+    settings = cage.cage_rig
+    obj = settings.armature
+    if settings.state != "LIVE":
+        raise BindError(f"'{cage.name}' is not live: {settings.message}")
+    if obj.library or obj.data.library or obj.override_library or obj.data.override_library:
+        raise BindError(f"Armature '{obj.name}' is linked from another file, so its rest bones can't be moved")
+    if shape_keys.is_animated(cage):
+        raise BindError(
+            f"The rest cage '{cage.name}' is animated, so its joints have no one place; "
+            "remove its keys, drivers and modifiers, or apply them, and try again"
+        )
+    rest = armature.read_rest(obj.data)
+    heads = dict(zip(rest.names, rest.heads, strict=True))
+    joints = sync.refit_joints(cage)
+    size = float(np.linalg.norm(np.ptp(joints, axis=0))) + 1e-12
+    places = {joint.name: place for joint, place in zip(settings.joints, joints, strict=True)}
+    moved = {name: place for name, place in places.items() if np.linalg.norm(place - heads[name]) > 1e-6 * size}
+    if not moved:
+        return 0
+    heads |= moved
+    keyed = armature.keyed_location(obj, armature.leaves_parent(obj.data, heads))
+    if keyed:
+        raise BindError(
+            f"Bone '{keyed}' of '{obj.name}' has to be disconnected, which would bring its keyed location to life; "
+            "delete its location keys and try again"
+        )
+    armature.move_heads(obj, context, heads)
+    for joint in settings.joints:
+        joint.shift = heads[joint.name] - np.array(joint.head)
+    context.view_layer.update()
+    return len(moved)
 
 
 def summary(cage: bpy.types.Object) -> str:

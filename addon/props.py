@@ -50,6 +50,9 @@ class CageRigJoint(bpy.types.PropertyGroup):
     parent: IntProperty(name="Parent", default=-1, override=OVERRIDABLE)
     head: FloatVectorProperty(name="Head", description="Rest position in the armature's space", override=OVERRIDABLE)
     tail: FloatVectorProperty(name="Tail", description="Rest tail in the armature's space", override=OVERRIDABLE)
+    shift: FloatVectorProperty(
+        name="Shift", description="How far Apply Refit has moved the bone since the bind", override=OVERRIDABLE
+    )
 
 
 class CageRigSuspended(bpy.types.PropertyGroup):

@@ -103,6 +103,11 @@ class Session:
         """What the bind found; see the core."""
         return dict(self.rig.report)
 
+    @property
+    def joints(self) -> Matrices:
+        """Rest joints refit to the rest cage, `#J by 3` in rig space."""
+        return np.asarray(self.rig.joints)
+
     @_door
     def play(self, cage: Points, transforms: Matrices, rest_joints: Matrices, influence: float = 1.0) -> None:
         """Set the rest cage (`#C by 3`, rig space) and the animation's transforms (`#J by 4 by 4`) together."""

@@ -103,6 +103,11 @@ def report(cage: bpy.types.Object) -> dict[str, object]:
     return {} if running is None else running.session.report
 
 
+def refit_joints(cage: bpy.types.Object) -> Matrix:
+    """Rest joints refit to the present rest cage, `#J by 3` in the armature's space. The rig must be live."""
+    return _running[cage.session_uid].session.joints
+
+
 def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
     """Sync one rig. Never raises: a rig that can't run is paused and says why."""
     global _busy

@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 from numpy.typing import NDArray
+
+from .. import compat
 
 Matrices = NDArray[np.float64]
 
@@ -76,27 +80,90 @@ def new_refit_armature(name: str, source: bpy.types.Armature) -> bpy.types.Armat
     return armature
 
 
-def free_bones(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Make every bone of the armature object parentless, unconnected and plain. Enters and leaves Edit Mode."""
+@contextmanager
+def editing(obj: bpy.types.Object, context: bpy.types.Context) -> Iterator[bpy.types.ArmatureEditBones]:
+    """Edit Mode of an armature object, wherever it is hidden; selection and visibility are put back after."""
     view_layer, root = context.view_layer, context.scene.collection
-    linked = obj.name in root.objects
+    linked, hidden = obj.name in root.objects, obj.hide_viewport
     if not linked:
         root.objects.link(obj)  # a bone can be edited only where its object is visible
+    obj.hide_viewport = False
+    eye = obj.hide_get()
+    obj.hide_set(False)
     active, selected = view_layer.objects.active, [other for other in view_layer.objects if other.select_get()]
     for other in selected:
         other.select_set(False)
     view_layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    for bone in obj.data.edit_bones:
-        bone.use_connect = False
-        bone.parent = None
-        bone.bbone_segments = 1
-    bpy.ops.object.mode_set(mode="OBJECT")
-    if not linked:
-        root.objects.unlink(obj)
-    for other in selected:
-        other.select_set(True)
-    view_layer.objects.active = active
+    try:
+        yield obj.data.edit_bones
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+        obj.hide_set(eye)
+        obj.hide_viewport = hidden
+        if not linked:
+            root.objects.unlink(obj)
+        for other in selected:
+            other.select_set(True)
+        view_layer.objects.active = active
+
+
+def free_bones(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    """Make every bone of the armature object parentless, unconnected and plain. Object Mode."""
+    with editing(obj, context) as bones:
+        for bone in bones:
+            bone.use_connect = False
+            bone.parent = None
+            bone.bbone_segments = 1
+
+
+def leaves_parent(armature: bpy.types.Armature, heads: dict[str, NDArray[np.float64]]) -> list[str]:
+    """Connected bones that can't stay so when these bones (all of the armature's) get new heads (armature's space).
+
+    A parent whose connected child stays on its axis can grow or shrink to it; another one would turn.
+    """
+    return [
+        bone.name
+        for bone in armature.bones
+        if bone.use_connect and bone.parent and not _on_axis(bone.parent, heads[bone.parent.name], heads[bone.name])
+    ]
+
+
+def _on_axis(bone: bpy.types.Bone, head: NDArray[np.float64], place: NDArray[np.float64]) -> bool:
+    along = np.array(bone.tail_local - bone.head_local)
+    offset = place - head
+    reach = float(offset @ along) / float(along @ along)
+    return reach > 1e-3 and float(np.linalg.norm(offset - reach * along)) < 1e-6 * float(np.linalg.norm(along))
+
+
+def keyed_location(obj: bpy.types.Object, names: list[str]) -> str | None:
+    """The first of these bones whose location the object's action keys, or None."""
+    paths = {f'pose.bones["{bpy.utils.escape_identifier(name)}"].location': name for name in names}
+    return next((paths[curve.data_path] for curve in compat.action_curves(obj) if curve.data_path in paths), None)
+
+
+def move_heads(obj: bpy.types.Object, context: bpy.types.Context, heads: dict[str, NDArray[np.float64]]) -> None:
+    """Move all rest bones by name to new heads (armature's space), orientation and roll kept. Object Mode.
+
+    Connected bones stay so where they can (`leaves_parent`); the others' pose locations, which a connection hides,
+    are set to 0.
+    """
+    leaving = leaves_parent(obj.data, heads)
+    for name in leaving:
+        obj.pose.bones[name].location = (0.0, 0.0, 0.0)
+    with editing(obj, context) as bones:
+        connected = {bone.name for bone in bones if bone.use_connect} - set(leaving)
+        for bone in bones:
+            bone.use_connect = False
+        for name, head in heads.items():
+            bone = bones[name]
+            along, roll = bone.tail - bone.head, bone.roll
+            reached = [heads[child.name] for child in bone.children if child.name in connected]
+            bone.head = Vector(head)
+            bone.tail = Vector(reached[0]) if reached else bone.head + along
+            bone.roll = roll
+        for name in connected:
+            bones[name].use_connect = True
 
 
 def depend_on_bones(obj: bpy.types.Object, armature_object: bpy.types.Object, names: list[str]) -> None:

@@ -98,3 +98,12 @@ def offsets(obj: bpy.types.Object, keys: bpy.types.Key, count: int) -> Points | 
             delta *= read_group(obj, block.vertex_group)[:, None]
         total = delta if total is None else total + delta
     return total
+
+
+def is_animated(obj: bpy.types.Object) -> bool:
+    """Whether the mesh of `obj` changes over time: keyed or driven shape keys or mesh, or a modifier at work."""
+    owners = (obj.data, obj.data.shape_keys)
+    animated = [owner.animation_data for owner in owners if owner is not None and owner.animation_data is not None]
+    if any(data.action is not None or len(data.drivers) or len(data.nla_tracks) for data in animated):
+        return True
+    return any(modifier.show_viewport or modifier.show_render for modifier in obj.modifiers)

@@ -5,12 +5,19 @@ from __future__ import annotations
 
 import bpy
 
+from .apply_refit import CAGE_RIG_OT_apply_refit
 from .bind import CAGE_RIG_OT_bind
 from .rebind import CAGE_RIG_OT_rebind
 from .select_part import CAGE_RIG_OT_select_part
 from .unbind import CAGE_RIG_OT_unbind
 
-CLASSES = (CAGE_RIG_OT_bind, CAGE_RIG_OT_rebind, CAGE_RIG_OT_unbind, CAGE_RIG_OT_select_part)
+CLASSES = (
+    CAGE_RIG_OT_bind,
+    CAGE_RIG_OT_rebind,
+    CAGE_RIG_OT_unbind,
+    CAGE_RIG_OT_apply_refit,
+    CAGE_RIG_OT_select_part,
+)
 
 
 def _object_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:

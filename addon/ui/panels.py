@@ -29,6 +29,7 @@ class VIEW3D_PT_cage_rig(bpy.types.Panel):
             return
         _draw_state(layout, cage, context.region.width)
         _draw_settings(layout, cage)
+        layout.operator("cage_rig.apply_refit", icon="BONE_DATA")
         row = layout.row(align=True)
         row.operator("cage_rig.rebind", icon="FILE_REFRESH")
         row.operator("cage_rig.unbind", icon="UNLINKED")
