@@ -91,7 +91,13 @@ def _skins_problem(cage: bpy.types.Object) -> str:
             return f"'{obj.name}' follows another cage; press Rebind to take it back"
         blocking = modifier.blocking(obj, list(obj.modifiers).index(ours))
         if blocking:
-            return f"Modifier '{blocking}' of '{obj.name}' stands before Cage Rig, which hides it; move it after"
+            return f"Modifier '{blocking}' of '{obj.name}' may change the vertices before Cage Rig; move it after"
+        reordering = modifier.reordering(obj)
+        if reordering:
+            return (
+                f"Modifier '{reordering}' of '{obj.name}' may reorder the vertices, so that what the modifiers before "
+                "Cage Rig do can't be read; switch one or the other off"
+            )
     return ""
 
 

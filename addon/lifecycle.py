@@ -188,8 +188,8 @@ def _read(
         blocking = modifier.blocking(obj, modifier.place(obj, armature_object))
         if blocking:
             raise BindError(
-                f"Modifier '{blocking}' of '{obj.name}' stands before the Armature modifier, where Cage Rig would "
-                "hide what it does; apply it or move it after"
+                f"Modifier '{blocking}' of '{obj.name}' may change the vertices before the Armature modifier; "
+                "apply it or move it after"
             )
     cage_points = positions.apply_matrix(to_rig[-1], positions.read_base(cage.data))
     core = Snapshot(

@@ -47,11 +47,13 @@ class _Running:
 _running: dict[int, _Running] = {}
 _busy = False
 _restoring = False
+_again: set[str] = set()  # rest cages whose rigs need one more update
 
 
 def forget() -> None:
     """Drop every session: after loading a file, and when the add-on goes."""
     _running.clear()
+    _again.clear()
     registry.forget()
 
 
@@ -64,12 +66,16 @@ def drop(cage: bpy.types.Object) -> None:
 def edited(depsgraph: bpy.types.Depsgraph) -> None:
     """After an update of the viewport: sync the rigs that it touched."""
     event = Event.RESTORED if _restoring else Event.EDIT
-    for cage in registry.touched(depsgraph):
+    cages = registry.touched(depsgraph)
+    cages += [cage for cage in registry.rigs() if cage.name in _again and cage not in cages] if _again else []
+    _again.clear()
+    for cage in cages:
         update(cage, depsgraph, event)
 
 
 def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     """After a frame change, in the viewport's depsgraph or a render's: sync every rig."""
+    _again.clear()
     for cage in registry.rigs():
         update(cage, depsgraph, Event.FRAME)
 
@@ -289,11 +295,17 @@ def _skin_to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgr
 
 
 def _skin_offsets(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> list[Points | None]:
-    """Rest-pose offsets of every skin: its shape keys, and its object moved against the armature since the bind."""
+    """Rest-pose offsets of every skin: by its shape keys, by modifiers before ours, and by its object's moves."""
     offsets: list[Points | None] = [None] * len(cage.cage_rig.skins)
     for index, obj in health.live_skins(cage):
+        if obj.data.is_editmode:
+            continue
         rest = running.session.snapshot.skins[index].points
         matrix, still = _skin_to_rig(cage, index, depsgraph)
+        given = _given(obj, depsgraph)
+        if given is not None:
+            offsets[index] = positions.apply_matrix(matrix, given) - rest
+            continue
         keys = obj.data.shape_keys
         local = None
         if keys is not None:
@@ -305,6 +317,37 @@ def _skin_offsets(cage: bpy.types.Object, running: _Running, depsgraph: bpy.type
             shift = local @ matrix[:3, :3].T.astype(np.float32)
             offsets[index] = shift if offsets[index] is None else offsets[index] + shift
     return offsets
+
+
+def _given(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points | None:
+    """The skin as modifiers before ours deform it, in its own space; None where there are none, or not yet."""
+    deformed = modifier.deformed_before(obj)
+    if not modifier.keep_input(obj, deformed):
+        _ask_again(obj.cage_rig.owner)  # it is kept from the next evaluation on
+        return None
+    if not deformed or not modifier.find(obj).show_viewport or obj.cage_rig.owner.name in _again:
+        return None
+    given = modifier.read_input(obj, depsgraph)
+    if given is None:
+        raise SessionError(
+            f"modifiers after Cage Rig on '{obj.name}' reorder its vertices, so that what the ones before it do can't "
+            "be read; switch one or the other off"
+        )
+    return given
+
+
+def _ask_again(cage: bpy.types.Object) -> None:
+    """Have the rig updated once more after this evaluation: a handler can't evaluate."""
+    _again.add(cage.name)
+    if not bpy.app.timers.is_registered(_tag_again):
+        bpy.app.timers.register(_tag_again, first_interval=0.0)
+
+
+def _tag_again() -> None:
+    for name in _again:
+        cage = bpy.data.objects.get(name)
+        if cage is not None:
+            cage.update_tag()
 
 
 def _write_back(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> None:
@@ -372,6 +415,8 @@ def _resume(cage: bpy.types.Object, note: str) -> None:
         for _, obj in health.live_skins(cage):
             modifier.show_suspended(obj, False)
             modifier.set_shown(obj, True)
+            if modifier.deformed_before(obj):
+                _ask_again(cage)
     lost = health.lost_skins(cage)
     if not note and lost:
         note = f"{lost} skin(s) of '{cage.name}' were deleted; Rebind forgets them"

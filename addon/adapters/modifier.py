@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The "Cage Rig" Geometry Nodes modifier on a skin, its feed, and the modifiers it stands in for.
 
-The feed is a FLOAT_VECTOR point attribute, one per rig, that the modifier's Set Position reads: base coordinates
-are never written. The modifier also takes the rest cage and the posed cage as object inputs, which is what makes
-Blender evaluate them (and, through a driver on the posed cage, every bone) when they are hidden.
+The feed is a FLOAT_VECTOR point attribute that the modifier's Set Position reads: base coordinates are never
+written. Where modifiers before ours move the skin, it also keeps what it was given, for the next update to read. The
+modifier takes the rest cage and the posed cage as object inputs, which is what makes Blender evaluate them (and,
+through a driver on the posed cage, every bone) when they are hidden.
 """
 
 from __future__ import annotations
@@ -16,11 +17,20 @@ from .positions import Points
 
 NAME = "Cage Rig"
 ATTRIBUTE = "cage_rig.posed"
-# Modifiers that touch no vertex: only they may stand before ours, which sets every position anew.
+INPUT = "cage_rig.input"
+# Modifiers that touch no vertex.
 HARMLESS = {
     "UV_PROJECT", "UV_WARP", "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "COLLISION",
     "NORMAL_EDIT", "WEIGHTED_NORMAL", "DATA_TRANSFER",
 }  # fmt: skip
+# Modifiers that move vertices and never add or remove any: before ours, what they do is a change of the rest skin.
+DEFORMING = {
+    "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP",
+    "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH", "SURFACE_DEFORM", "WARP", "WAVE", "CLOTH",
+    "SOFT_BODY", "MESH_CACHE",
+}  # fmt: skip
+# Modifiers that keep the vertices they are given first and in order.
+GROWING = {"ARRAY", "MIRROR", "MULTIRES", "SOLIDIFY", "SUBSURF", "TRIANGULATE"}
 
 
 def node_group() -> bpy.types.NodeTree:
@@ -37,18 +47,33 @@ def node_group() -> bpy.types.NodeTree:
     new("Attribute", in_out="INPUT", socket_type="NodeSocketString")
     for name in ("Rest Cage", "Posed Cage"):
         new(name, in_out="INPUT", socket_type="NodeSocketObject")
+    new("Keep Input", in_out="INPUT", socket_type="NodeSocketBool")
     nodes, links = group.nodes, group.links
     source, target = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput")
     named, place = nodes.new("GeometryNodeInputNamedAttribute"), nodes.new("GeometryNodeSetPosition")
     named.data_type = "FLOAT_VECTOR"
-    links.new(source.outputs["Geometry"], place.inputs["Geometry"])
+    keep, store = nodes.new("GeometryNodeSwitch"), nodes.new("GeometryNodeStoreNamedAttribute")
+    position = nodes.new("GeometryNodeInputPosition")
+    keep.input_type, store.data_type, store.domain = "GEOMETRY", "FLOAT_VECTOR", "POINT"
+    store.inputs["Name"].default_value = INPUT
+    links.new(source.outputs["Geometry"], store.inputs["Geometry"])
+    links.new(position.outputs["Position"], _socket(store.inputs, "Value"))
+    links.new(source.outputs["Keep Input"], keep.inputs["Switch"])
+    links.new(source.outputs["Geometry"], _socket(keep.inputs, "False"))
+    links.new(store.outputs["Geometry"], _socket(keep.inputs, "True"))
+    links.new(_socket(keep.outputs, "Output"), place.inputs["Geometry"])
     links.new(source.outputs["Attribute"], named.inputs["Name"])
     links.new(named.outputs["Exists"], place.inputs["Selection"])
     links.new(named.outputs["Attribute"], place.inputs["Position"])
     links.new(place.outputs["Geometry"], target.inputs["Geometry"])
-    for column, node in enumerate((source, named, place, target)):
+    for column, node in enumerate((source, position, store, keep, named, place, target)):
         node.location = (column * 200, 0)
     return group
+
+
+def _socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
+    """The enabled socket of this name: a node keeps one for every data type."""
+    return next(socket for socket in sockets if socket.name == name and socket.enabled)
 
 
 def find(skin: bpy.types.Object) -> bpy.types.Modifier | None:
@@ -154,12 +179,57 @@ def place(skin: bpy.types.Object, armature: bpy.types.Object) -> int:
     return 0
 
 
+def _shown_before(skin: bpy.types.Object, index: int) -> list[bpy.types.Modifier]:
+    return [m for m in list(skin.modifiers)[:index] if (m.show_viewport or m.show_render) and m.type not in HARMLESS]
+
+
 def blocking(skin: bpy.types.Object, index: int) -> str | None:
-    """The name of a shown modifier before `index` whose effect ours would spoil or hide, or None."""
-    for modifier in list(skin.modifiers)[:index]:
-        if modifier.type not in HARMLESS and (modifier.show_viewport or modifier.show_render):
-            return modifier.name
-    return None
+    """The name of a shown modifier before `index` that may add or remove vertices, or None."""
+    return next((m.name for m in _shown_before(skin, index) if m.type not in DEFORMING), None)
+
+
+def deformed_before(skin: bpy.types.Object) -> bool:
+    """Whether shown modifiers before ours move the skin."""
+    ours = find(skin)
+    return ours is not None and bool(_shown_before(skin, list(skin.modifiers).index(ours)))
+
+
+def reordering(skin: bpy.types.Object) -> str | None:
+    """The name of a shown modifier after ours that may reorder vertices, where what ours is given has to be read."""
+    if not deformed_before(skin):
+        return None
+    ours = list(skin.modifiers).index(find(skin))
+    known = HARMLESS | DEFORMING | GROWING
+    after = [m for m in list(skin.modifiers)[ours + 1 :] if m.show_viewport or m.show_render]
+    return next((m.name for m in after if m.type not in known), None)
+
+
+def keep_input(skin: bpy.types.Object, keep: bool) -> bool:
+    """Let our modifier keep what it is given, or not; returns whether that was so already."""
+    ours = find(skin)
+    identifier = _identifier(ours.node_group, "Keep Input")
+    if bool(compat.modifier_input(ours, identifier)) == keep:
+        return True
+    compat.set_modifier_input(ours, identifier, keep)
+    skin.update_tag()
+    return False
+
+
+def read_input(skin: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points | None:
+    """What our modifier was given in `depsgraph`, `#M by 3`; None where modifiers after ours made it unreadable.
+
+    They may add vertices after the first `#M` but not reorder those: the feed, which went with them, is the proof.
+    """
+    count = len(skin.data.vertices)
+    mesh = skin.evaluated_get(depsgraph).data
+    if INPUT not in mesh.attributes or len(mesh.vertices) < count:
+        return None
+    arrays = []
+    for source, name in ((mesh, INPUT), (mesh, ATTRIBUTE), (skin.data, ATTRIBUTE)):
+        points = np.empty((len(source.vertices), 3), np.float32)
+        source.attributes[name].data.foreach_get("vector", points.ravel())
+        arrays.append(points[:count])
+    return arrays[0] if np.array_equal(arrays[1], arrays[2]) else None
 
 
 def release(skin: bpy.types.Object) -> None:

@@ -206,13 +206,6 @@ def subdivision_first(objects: RigObjects) -> str:
     return "Smooth it"
 
 
-def lattice_first(objects: RigObjects) -> str:
-    skin = objects.skins[0]
-    skin.modifiers.new("Bend it", "LATTICE")
-    skin.modifiers.move(1, 0)
-    return "Bend it"
-
-
 def flat_skin(objects: RigObjects) -> str:
     objects.skins[0].scale.x = 0.0
     update()
@@ -230,7 +223,6 @@ def flat_skin(objects: RigObjects) -> str:
         shared_mesh,
         bendy_bone,
         subdivision_first,
-        lattice_first,
         flat_skin,
     ],
 )
@@ -297,15 +289,3 @@ def test_modifiers_after_ours_work_on_the_posed_skin() -> None:
     live = shown(rig.skin)
     assert len(live) > len(rest(rig.skin))
     assert np.abs(live - native(rig.skin)).max() < 1e-5 * rig.size
-
-
-def test_a_deforming_modifier_moved_before_ours_pauses(bar: Rig) -> None:
-    modifier = bar.skin.modifiers.new("Bend it", "SIMPLE_DEFORM")
-    update()
-    assert bar.settings.state == "LIVE"
-    bar.skin.modifiers.move(len(bar.skin.modifiers) - 1, 0)
-    update()
-    assert bar.settings.state == "PAUSED" and modifier.name in bar.settings.message
-    bar.skin.modifiers.move(0, len(bar.skin.modifiers) - 1)
-    update()
-    assert bar.settings.state == "LIVE"
