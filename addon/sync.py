@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import health, registry
+from . import health, registry, skins
 from .adapters import armature, modifier, positions, shape_keys, snapshot
 from .session import Session, SessionCrash, SessionError, SkinSnapshot, Snapshot
 
@@ -154,7 +154,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
 
 def _start(cage: bpy.types.Object) -> _Running:
     settings = cage.cage_rig
-    skins = [
+    parts = [
         SkinSnapshot(
             positions.read_base(skin.snapshot),
             positions.read_faces(skin.snapshot),
@@ -166,7 +166,7 @@ def _start(cage: bpy.types.Object) -> _Running:
     return _Running(
         Session(
             Snapshot(
-                skins,
+                parts,
                 np.array([joint.head for joint in joints], np.float64).reshape(-1, 3),
                 np.array([joint.tail for joint in joints], np.float64).reshape(-1, 3),
                 np.array([joint.parent for joint in joints], np.int32),
@@ -182,7 +182,10 @@ def _start(cage: bpy.types.Object) -> _Running:
 def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:
     """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
     session, settings = running.session, cage.cage_rig
-    session.offset_skins(_skin_offsets(cage, running, depsgraph))
+    offsets, complete = skins.offsets(cage, session, depsgraph, readable=cage.name not in _again)
+    session.offset_skins(offsets)
+    if not complete:
+        _ask_again(cage)
     transforms, rest_joints = _read_pose(cage, running, depsgraph)
     influence = float(cage.evaluated_get(depsgraph).cage_rig.influence)
     rest = _read_rest_cage(cage, depsgraph)
@@ -283,59 +286,6 @@ def _read_pose(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.D
     return transforms, rest[:, :3, 3].copy()
 
 
-def _skin_to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, bool]:
-    """Matrix from skin `index` to the armature's space now, and whether it is still that of the bind."""
-    skin = cage.cage_rig.skins[index]
-    bones = cage.cage_rig.armature.evaluated_get(depsgraph).matrix_world
-    world = skin.object.evaluated_get(depsgraph).matrix_world
-    bound, now = _matrix(skin.skin_to_rig), _matrix(bones.inverted_safe() @ world)
-    far = 1.0 + max(float(np.abs(_matrix(world)).max()), float(np.abs(_matrix(bones)).max()))
-    still = bool(np.allclose(now, bound, rtol=0.0, atol=2e-6 * far))
-    return (bound, True) if still else (now, False)
-
-
-def _skin_offsets(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> list[Points | None]:
-    """Rest-pose offsets of every skin: by its shape keys, by modifiers before ours, and by its object's moves."""
-    offsets: list[Points | None] = [None] * len(cage.cage_rig.skins)
-    for index, obj in health.live_skins(cage):
-        if obj.data.is_editmode:
-            continue
-        rest = running.session.snapshot.skins[index].points
-        matrix, still = _skin_to_rig(cage, index, depsgraph)
-        given = _given(obj, depsgraph)
-        if given is not None:
-            offsets[index] = positions.apply_matrix(matrix, given) - rest
-            continue
-        keys = obj.data.shape_keys
-        local = None
-        if keys is not None:
-            local = shape_keys.offsets(obj, keys.evaluated_get(depsgraph), len(rest))
-        if not still:
-            moved = matrix @ np.linalg.inv(_matrix(cage.cage_rig.skins[index].skin_to_rig))
-            offsets[index] = positions.apply_matrix(moved, rest) - rest
-        if local is not None:
-            shift = local @ matrix[:3, :3].T.astype(np.float32)
-            offsets[index] = shift if offsets[index] is None else offsets[index] + shift
-    return offsets
-
-
-def _given(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points | None:
-    """The skin as modifiers before ours deform it, in its own space; None where there are none, or not yet."""
-    deformed = modifier.deformed_before(obj)
-    if not modifier.keep_input(obj, deformed):
-        _ask_again(obj.cage_rig.owner)  # it is kept from the next evaluation on
-        return None
-    if not deformed or not modifier.find(obj).show_viewport or obj.cage_rig.owner.name in _again:
-        return None
-    given = modifier.read_input(obj, depsgraph)
-    if given is None:
-        raise SessionError(
-            f"modifiers after Cage Rig on '{obj.name}' reorder its vertices, so that what the ones before it do can't "
-            "be read; switch one or the other off"
-        )
-    return given
-
-
 def _ask_again(cage: bpy.types.Object) -> None:
     """Have the rig updated once more after this evaluation: a handler can't evaluate."""
     _again.add(cage.name)
@@ -351,22 +301,9 @@ def _tag_again() -> None:
 
 
 def _write_back(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> None:
-    session, settings = running.session, cage.cage_rig
-    for index, obj in health.live_skins(cage):
-        if obj.data.is_editmode:
-            running.written.pop(index, None)
-            continue
-        matrix, _ = _skin_to_rig(cage, index, depsgraph)
-        state = (session.revision, matrix.tobytes())
-        if running.written.get(index) == state and modifier.ATTRIBUTE in obj.data.attributes:
-            continue
-        points = session.posed_skin(index)
-        if not np.array_equal(matrix, np.eye(4)):
-            points = positions.apply_matrix(np.linalg.inv(matrix), points)
-        modifier.write(obj, points)
-        running.written[index] = state
-    _write_posed_cage(running, settings.posed_cage)
-    _write_refit(running, settings.refit_armature)
+    skins.write(cage, running.session, depsgraph, running.written)
+    _write_posed_cage(running, cage.cage_rig.posed_cage)
+    _write_refit(running, cage.cage_rig.refit_armature)
 
 
 def _write_posed_cage(running: _Running, posed: bpy.types.Object) -> None:

@@ -115,6 +115,8 @@ def free_bones(obj: bpy.types.Object, context: bpy.types.Context) -> None:
             bone.use_connect = False
             bone.parent = None
             bone.bbone_segments = 1
+            bone.use_local_location = bone.use_inherit_rotation = True
+            bone.inherit_scale = "FULL"
 
 
 def leaves_parent(armature: bpy.types.Armature, heads: dict[str, NDArray[np.float64]]) -> list[str]:
