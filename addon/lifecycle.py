@@ -294,6 +294,7 @@ def _make_posed_cage(context: bpy.types.Context, cage: bpy.types.Object, bound: 
     """The posed cage: a mesh of the cage's faces in rig space, parented to the armature."""
     settings = cage.cage_rig
     mesh = positions.new_mesh(f"{cage.name} Posed", bound.snapshot.cage, bound.snapshot.cage_faces)
+    positions.add_layers(mesh, sync.MEMORY)
     obj = settings.posed_cage
     if obj is None:
         obj = bpy.data.objects.new(mesh.name, mesh)

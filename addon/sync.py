@@ -22,6 +22,11 @@ Points = NDArray[np.float32]
 Matrix = NDArray[np.float64]
 
 
+# Kept with the posed cage's edit mesh: the rest cage (rig space) and the posed cage that belonged together when last
+# synced. Undo in Edit Mode restores that mesh alone; what it remembers brings the rest cage back, whatever the pose.
+MEMORY = ("cage_rig.rest", "cage_rig.posed")
+
+
 class Event(enum.Enum):
     """What made Blender call us."""
 
@@ -39,6 +44,7 @@ class _Running:
     cage: Points | None = None  # rest cage, rig space, as last read
     cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
     posed: Points | None = None  # posed cage as last read or written
+    memory: bytes = b""  # what the edit mesh of the posed cage remembers
     refit_rest: Matrix | None = None
     bone_inverse: tuple[bytes, Matrix] | None = None  # rest matrices and their inverses
     written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
@@ -146,7 +152,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
         event = Event.RESTORED
     if event is Event.RESTORED:
         running.written.clear()
-        running.cage_wanted = None
+        running.cage_wanted, running.memory = None, b""
     note = _advance(cage, running, depsgraph, event)
     _write_back(cage, running, depsgraph)
     _resume(cage, note)
@@ -193,6 +199,12 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
         raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")
     rest_changed = not _is_known(running, rest)
     posed = _read_posed_cage(settings.posed_cage)
+    if event is Event.RESTORED and settings.posed_cage.data.is_editmode:
+        memory = positions.read_edit_layers(settings.posed_cage.data, MEMORY)
+        if memory is not None:
+            running.cage, running.posed = rest, posed
+            session.play(memory[0], transforms, rest_joints, influence)
+            return _recall(cage, running, *memory)
     posed_changed = running.posed is None or not np.array_equal(posed, running.posed)
     is_edit = posed_changed and _posed_is_edit(cage, event, rest_changed)
     if rest_changed:
@@ -201,6 +213,25 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     session.play(known, transforms, rest_joints, influence)
     running.posed = posed
     return _take_posed_edit(cage, running, posed) if is_edit else ""
+
+
+def _recall(cage: bpy.types.Object, running: _Running, rest: Points, posed: Points) -> str:
+    """After an undo in Edit Mode of the posed cage: back to the `rest` that its edit mesh remembers.
+
+    Where the vertices are not at the remembered `posed`, the step was saved after a move and before it was synced: the
+    move is made again.
+    """
+    move = running.posed - posed
+    if np.abs(move).max() > 1e-6 * running.session.size:
+        return _take_posed_edit(cage, running, running.session.posed_cage() + move)
+    if not np.allclose(rest, running.cage, rtol=0.0, atol=1e-6 * running.session.size):
+        try:
+            _move_rest_cage(cage, running.cage, rest)
+        except shape_keys.KeyRefusal as error:
+            running.posed = None
+            return str(error)
+    running.cage_wanted = rest
+    return ""
 
 
 def _is_known(running: _Running, rest: Points) -> bool:
@@ -303,6 +334,7 @@ def _tag_again() -> None:
 def _write_back(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> None:
     skins.write(cage, running.session, depsgraph, running.written)
     _write_posed_cage(running, cage.cage_rig.posed_cage)
+    _remember(running, cage.cage_rig.posed_cage)
     _write_refit(running, cage.cage_rig.refit_armature)
 
 
@@ -316,6 +348,17 @@ def _write_posed_cage(running: _Running, posed: bpy.types.Object) -> None:
     write = positions.write_edit_mesh if posed.data.is_editmode else positions.write_base
     write(posed.data, points)
     running.posed = points.copy()
+
+
+def _remember(running: _Running, posed: bpy.types.Object) -> None:
+    if not posed.data.is_editmode:
+        running.memory = b""
+        return
+    rest = running.cage if running.cage_wanted is None else running.cage_wanted
+    memory = rest.tobytes() + running.posed.tobytes()
+    if memory != running.memory:
+        positions.write_edit_layers(posed.data, dict(zip(MEMORY, (rest, running.posed), strict=True)))
+        running.memory = memory
 
 
 def _write_refit(running: _Running, refit: bpy.types.Object | None) -> None:

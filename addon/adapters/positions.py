@@ -40,6 +40,32 @@ def write_edit_mesh(mesh: bpy.types.Mesh, points: Points) -> None:
     bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
 
 
+def add_layers(mesh: bpy.types.Mesh, names: tuple[str, ...]) -> None:
+    """Add point attributes that `write_edit_layers` can fill in Edit Mode. Not in Edit Mode."""
+    for name in names:
+        mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+
+
+def write_edit_layers(mesh: bpy.types.Mesh, values: dict[str, Points]) -> None:
+    """Keep `#V by 3` arrays with the edit mesh, in point attributes that exist. An undo in Edit Mode restores them."""
+    edit = bmesh.from_edit_mesh(mesh)
+    for name, points in values.items():
+        layer = edit.verts.layers.float_vector.get(name)
+        if layer is not None:
+            for vertex, point in zip(edit.verts, points.tolist(), strict=True):
+                vertex[layer] = point
+
+
+def read_edit_layers(mesh: bpy.types.Mesh, names: tuple[str, ...]) -> list[Points] | None:
+    """What `write_edit_layers` kept, or None where nothing was."""
+    edit = bmesh.from_edit_mesh(mesh)
+    layers = [edit.verts.layers.float_vector.get(name) for name in names]
+    if any(layer is None for layer in layers):
+        return None
+    found = [np.array([vertex[layer] for vertex in edit.verts], np.float32).reshape(-1, 3) for layer in layers]
+    return found if all(np.any(points) for points in found) else None
+
+
 def write_base(mesh: bpy.types.Mesh, points: Points) -> None:
     """Write base coordinates through the position attribute. Not in Edit Mode."""
     flat = np.ascontiguousarray(points, np.float32).ravel()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -47,9 +48,10 @@ def state() -> dict[str, np.ndarray]:
     }
 
 
-def assert_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> None:
+def assert_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray], *, tolerance: float = 5e-6) -> None:
     for name, points in wanted.items():
-        assert np.abs(found[name] - points).max() < 5e-6, f"{name} differs by {np.abs(found[name] - points).max()}"
+        error = np.abs(found[name] - points).max()
+        assert error < tolerance, f"{name} differs by {error}"
 
 
 @pytest.fixture
@@ -146,6 +148,51 @@ def test_undo_in_edit_mode_of_the_posed_cage_brings_the_rest_cage_back(undoable:
     assert_same(state(), states[-1])
 
 
+def test_undo_in_edit_mode_after_the_frame_changed(undoable: Rig) -> None:
+    """The rest cage comes back as it was; the posed cage is that of the new frame."""
+    bone = undoable.armature.pose.bones["upper"]
+    bone.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.2), (20, 1.4)):
+        bone.rotation_euler = (0, 0, angle)
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    scene = bpy.context.scene
+    scene.frame_set(20)
+    late = state()
+    scene.frame_set(1)
+    push("keys")
+    enter_edit_mode(undoable.posed)
+    push("edit mode")
+    early = state()
+    drag(current().posed, 14, (0.0, 0.1, 0.05))
+    push("drag")
+    dragged = state()
+    bpy.context.scene.frame_set(20)
+    bpy.ops.ed.undo()
+    assert_same(state(), late)
+    bpy.context.scene.frame_set(1)
+    assert_same(state(), early)
+    bpy.ops.ed.redo()
+    assert_same(state(), dragged)
+
+
+def test_undo_in_edit_mode_to_a_step_saved_before_the_rig_followed(undoable: Rig) -> None:
+    """A script's operator in Edit Mode saves its undo step before the update in which the rest cage follows."""
+    bend(undoable, 1.0)
+    push("bend")
+    enter_edit_mode(undoable.posed)
+    push("edit mode")
+    edit = bmesh.from_edit_mesh(undoable.posed.data)
+    edit.verts.ensure_lookup_table()
+    edit.verts[14].co.y += 0.1
+    bmesh.update_edit_mesh(undoable.posed.data)
+    push("moved, not updated yet")
+    wanted = state()
+    drag(current().posed, 9, (0.1, 0.0, 0.0))
+    push("drag")
+    bpy.ops.ed.undo()
+    assert_same(state(), wanted)
+
+
 def test_undo_to_a_step_that_was_saved_before_the_rig_followed(undoable: Rig) -> None:
     """An operator's undo step is saved when it ends, before the update in which the posed cage follows."""
     bend(undoable, 1.0)
@@ -183,5 +230,53 @@ def test_random_edits_and_undos_equal_a_fresh_computation(undoable: Rig, seed: i
             at += 1
             states[at:] = [state()]
         assert_same(state(), states[at])
+    live = state()["skin"]
+    assert np.abs(fresh(current())[0] - live).max() < 5e-6
+
+
+def act_in_edit_mode(objects: list[bpy.types.Object], chance: random.Random) -> None:
+    if chance.random() < 0.3:
+        leave_edit_mode()
+    else:
+        offset = (chance.uniform(-0.1, 0.1), chance.uniform(-0.1, 0.1), 0.0)
+        drag(chance.choice(objects), chance.randrange(28), offset)
+
+
+def act_in_object_mode(rig: Rig, chance: random.Random) -> None:
+    name = chance.choice(["pose", "rest", "posed", "enter posed", "enter rest", "enter both"])
+    if name in EDITS:
+        EDITS[name](rig, chance.uniform(-1.0, 1.0))
+        return
+    entered = {"enter posed": [rig.posed], "enter rest": [rig.cage], "enter both": [rig.posed, rig.cage]}[name]
+    enter_edit_mode(*entered)
+    update()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_random_edits_modes_and_undos_equal_what_was_there(undoable: Rig, seed: int) -> None:
+    chance = random.Random(seed)
+    states, at = [state()], 0
+    for _ in range(70):
+        draw = chance.random()
+        if draw < 0.3 and at > 0:
+            bpy.ops.ed.undo()
+            at -= 1
+        elif draw < 0.45 and at < len(states) - 1:
+            bpy.ops.ed.redo()
+            at += 1
+        else:
+            rig = current()
+            in_edit_mode = [obj for obj in (rig.posed, rig.cage) if obj.data.is_editmode]
+            if in_edit_mode:
+                act_in_edit_mode(in_edit_mode, chance)
+            else:
+                act_in_object_mode(rig, chance)
+            push("act")
+            at += 1
+            states[at:] = [state()]
+        assert_same(state(), states[at], tolerance=2e-5)
+        assert current().settings.state == "LIVE", current().settings.message
+    if any(obj.data.is_editmode for obj in (current().posed, current().cage)):
+        leave_edit_mode()
     live = state()["skin"]
     assert np.abs(fresh(current())[0] - live).max() < 5e-6
