@@ -27,12 +27,13 @@ def test_coordinates_and_joints(arm, inputs):
     np.testing.assert_array_equal(direct, rig.cage_coords)
 
 
-def test_poses(arm, inputs):
+@pytest.mark.parametrize("method", core.skinning_methods())
+def test_poses(arm, inputs, method):
     poses = arm["poses"]
-    rig = core.CoupledRig(**inputs, anchors=arm["inputs"]["maxvol"])
+    rig = core.CoupledRig(**inputs, anchors=arm["inputs"]["maxvol"], method=method)
     for k in range(len(poses["t"])):
         rig.pose(poses["T_skin"][k])
-        assert np.abs(rig.posed_skin - poses["Mp_lbs"][k]).max() <= 2e-6 * rig.size
+        assert np.abs(rig.posed_skin - poses[f"Mp_{method}"][k]).max() <= 2e-6 * rig.size
         assert np.abs(rig.posed_cage - poses["Cp_lbs"][k]).max() <= 1e-8
 
 

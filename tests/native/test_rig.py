@@ -81,6 +81,49 @@ def test_offsets_move_the_visible_skin_only(bar, bent):
     np.testing.assert_array_equal(rig.posed_skin, skin)
 
 
+@pytest.mark.parametrize("method", core.skinning_methods())
+def test_the_method_can_be_changed_at_any_time(bar, bent, method):
+    bound, changed = core.CoupledRig(**bar, method=method), core.CoupledRig(**bar)
+    assert (bound.method, changed.method) == (method, "lbs")
+    for rig in (bound, changed):
+        rig.pose(bent)
+        read(rig)
+    cage, work = changed.posed_cage, changed.work
+    changed.set_method(method)
+    assert changed.method == method
+    np.testing.assert_array_equal(changed.posed_skin, bound.posed_skin)
+    np.testing.assert_array_equal(changed.posed_cage, cage)
+    assert changed.work["skin_passes"] == work["skin_passes"] + (method != "lbs")
+    assert changed.work["cage_fits"] == work["cage_fits"]
+    again = changed.work
+    changed.set_method(method)
+    read(changed)
+    assert changed.work == again
+
+
+def test_an_unknown_method_is_refused_with_the_choices(bar):
+    rig = core.CoupledRig(**bar)
+    with pytest.raises(core.CageRigError, match="ragdoll.*lbs, dqs"):
+        rig.set_method("ragdoll")
+    assert rig.method == "lbs"
+
+
+@pytest.mark.parametrize("method", core.skinning_methods())
+def test_the_posed_cage_lands_where_it_is_dragged_on_a_bent_elbow(bar, method):
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    elbow = np.tile(np.eye(4), (2, 1, 1))
+    elbow[1, :3, :3] = turn
+    elbow[1, :3, 3] = bar["joints"][1] - turn @ bar["joints"][1]
+    rig = core.CoupledRig(**bar, method=method)
+    rig.pose(elbow)
+    wanted = rig.posed_cage
+    wanted[4:8] += [0.3, -0.2, 0.1]
+    rig.edit_posed_cage(wanted)
+    fresh = core.CoupledRig(**bar, method=method)
+    fresh.play(rig.rest_cage, elbow)
+    assert np.abs(fresh.posed_cage - wanted).max() <= 1e-9 * rig.size
+
+
 def test_work_and_report_are_plain_dictionaries(bar, bent):
     rig = core.CoupledRig(**bar)
     rig.pose(bent)
@@ -154,7 +197,7 @@ def test_a_panic_is_an_exception_and_poisons_the_rig_alone(bar):
 
 
 def test_families_list_their_members():
-    assert "lbs" in core.skinning_methods()
+    assert core.skinning_methods()[:2] == ["lbs", "dqs"]
     assert "mean_value" in core.coordinate_kinds()
     assert core.__version__
 

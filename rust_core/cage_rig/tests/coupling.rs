@@ -2,6 +2,8 @@
 
 mod common;
 
+use cage_rig::skinning::METHODS;
+use cage_rig::sync::BindInput;
 use cage_rig::{CoupledRig, Point, PoseError, Transform};
 use common::{all, arm, distance, lively_pose, nudged, points, Fixture};
 
@@ -97,6 +99,59 @@ fn the_artists_posed_cage_is_kept_through_the_whole_loop() {
         assert!(distance(rig.posed_cage(), &wanted) <= 1e-9 * fixture.size());
         let again = posed_afresh(&fixture, &rig, &pose);
         assert!(distance(&again, &wanted) <= 1e-9 * fixture.size(), "{}", fixture.name);
+    }
+}
+
+#[test]
+fn whatever_the_method_the_posed_cage_lands_where_it_is_dragged() {
+    // An elbow at a right angle. The visible skin differs, cages and joints do not.
+    for fixture in all() {
+        let mut pose = vec![Transform::identity(); fixture.joints.len()];
+        pose[1] = common::turn(fixture.joints[1], Point::y(), std::f64::consts::FRAC_PI_2);
+        let mut linear = fixture.rig();
+        linear.pose(&pose, None).expect("a valid pose");
+        let wanted = nudged(linear.posed_cage(), 0.03 * fixture.size(), 6);
+        linear.edit_posed_cage(&wanted).expect("a solvable pose");
+        for method in METHODS {
+            let mut rig = CoupledRig::new(BindInput { method, ..fixture.input() }).expect("it binds");
+            rig.pose(&pose, None).expect("a valid pose");
+            rig.edit_posed_cage(&wanted).expect("a solvable pose");
+            assert_eq!(rig.rest_cage(), linear.rest_cage(), "{}", method.name);
+            let mut fresh = CoupledRig::new(BindInput { method, ..fixture.input() }).expect("it binds");
+            fresh.play(rig.rest_cage(), &pose, None).expect("a valid frame");
+            assert!(distance(fresh.posed_cage(), &wanted) <= 1e-9 * fixture.size(), "{}", method.name);
+            let apart = distance(&points(rig.posed_skin()), &points(linear.posed_skin()));
+            assert_eq!(apart == 0.0, method.name == "lbs", "{} {}", method.name, fixture.name);
+        }
+    }
+}
+
+#[test]
+fn a_method_changes_the_posed_skin_alone_and_at_any_time() {
+    for fixture in all() {
+        for method in METHODS {
+            let pose = lively_pose(&fixture, 0.6);
+            let cage = nudged(&fixture.cage, 0.05 * cage_size(&fixture), 8);
+            let mut bound = CoupledRig::new(BindInput { method, ..fixture.input() }).expect("it binds");
+            let mut changed = fixture.rig();
+            for rig in [&mut bound, &mut changed] {
+                rig.play(&cage, &pose, None).expect("a valid frame");
+                rig.posed_skin();
+                rig.posed_cage();
+            }
+            let before = changed.work();
+            changed.set_method(method);
+            assert_eq!(changed.method().number, method.number);
+            assert_eq!(changed.posed_skin(), bound.posed_skin());
+            assert_eq!(changed.posed_cage(), bound.posed_cage());
+            let after = changed.work();
+            let skinned = usize::from(method.name != "lbs");
+            assert_eq!(after.skin_passes, before.skin_passes + skinned);
+            assert_eq!((after.cage_fits, after.rest_passes), (before.cage_fits, before.rest_passes));
+            changed.set_method(method);
+            changed.posed_skin();
+            assert_eq!(changed.work(), after, "the same method again is no work");
+        }
     }
 }
 

@@ -143,6 +143,18 @@ impl CoupledRig {
         self.with(py, |rig| rig.offset_rest_skin(offsets.as_deref()))?.or_raise()
     }
 
+    /// Changes how the bones move the visible skin; nothing else depends on it.
+    fn set_method(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        let method = cage_rig::skinning::method(name).or_raise()?;
+        self.with(py, |rig| rig.set_method(method))
+    }
+
+    /// The name of the skinning method.
+    #[getter]
+    fn method(&self, py: Python<'_>) -> PyResult<&'static str> {
+        self.with(py, |rig| rig.method().name)
+    }
+
     /// Writes rows of the posed skin, from row start on, into out (n, 3) or flat.
     #[pyo3(signature = (out, start=0))]
     fn posed_skin_into(&self, py: Python<'_>, out: &Bound<'_, PyAny>, start: usize) -> PyResult<()> {

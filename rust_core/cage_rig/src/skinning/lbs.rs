@@ -5,31 +5,14 @@
 //! v′ = v + Σ_j ω_ij ((R_j − I) v + t_j), that needs no case of its own and is exact at rest.
 //! Linear parts may scale and shear. Cost: one small sum per influence.
 
-use super::SkinningInput;
+use super::{each_vertex, SkinningInput};
 use crate::points::{Matrix3, Point, Transform};
 use crate::weights::SkinWeights;
-use rayon::prelude::*;
-
-/// Below this many vertices one thread is faster than two.
-const PARALLEL_FROM: usize = 8192;
 
 /// M′ of a frame, in single precision.
 pub fn pose(input: &SkinningInput, posed: &mut [[f32; 3]]) {
     let bones: Vec<[f32; 12]> = input.transforms.iter().map(displacement).collect();
-    let chunk = if posed.len() < PARALLEL_FROM { PARALLEL_FROM } else { 2048 };
-    let pose_chunk = |(index, chunk_out): (usize, &mut [[f32; 3]])| {
-        let first = index * chunk;
-        for (i, out) in chunk_out.iter_mut().enumerate() {
-            let range =
-                input.weights.starts[first + i] as usize..input.weights.starts[first + i + 1] as usize;
-            *out = displaced(&bones, &input.weights.influences[range], input.rest_skin[first + i]);
-        }
-    };
-    if posed.len() < PARALLEL_FROM {
-        posed.chunks_mut(chunk).enumerate().for_each(pose_chunk);
-    } else {
-        posed.par_chunks_mut(chunk).enumerate().for_each(pose_chunk);
-    }
+    each_vertex(input, posed, |_, influences, v| displaced(&bones, influences, v));
 }
 
 /// R − I and t, columns first.

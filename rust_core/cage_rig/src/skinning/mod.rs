@@ -4,15 +4,21 @@
 //! transforms, moves it rigidly when all transforms are the same rigid motion, and never moves a
 //! vertex without weights.
 
+pub mod dqs;
 pub mod lbs;
 #[cfg(test)]
 pub(crate) mod naive;
+pub mod rotation;
 #[cfg(test)]
 mod tests;
 
 use crate::error::Error;
 use crate::points::Transform;
 use crate::weights::SkinWeights;
+use rayon::prelude::*;
+
+/// Below this many vertices one thread is faster than two.
+const PARALLEL_FROM: usize = 8192;
 
 /// What a frame needs, whatever the method.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +34,8 @@ pub struct SkinningInput<'a> {
 /// A skinning method.
 #[derive(Debug, Clone, Copy)]
 pub struct SkinningMethod {
+    /// The number files keep; never changes.
+    pub number: u8,
     /// The name scripts use.
     pub name: &'static str,
     /// The name people read.
@@ -36,9 +44,11 @@ pub struct SkinningMethod {
     pub pose: fn(&SkinningInput, &mut [[f32; 3]]),
 }
 
-/// Every method there is. The first one is the default.
-pub const METHODS: &[SkinningMethod] =
-    &[SkinningMethod { name: "lbs", label: "Linear Blend", pose: lbs::pose }];
+/// Every method there is. The first one is the default; a new one takes the next number.
+pub const METHODS: &[SkinningMethod] = &[
+    SkinningMethod { number: 0, name: "lbs", label: "Linear Blend", pose: lbs::pose },
+    SkinningMethod { number: 1, name: "dqs", label: "Dual Quaternion", pose: dqs::pose },
+];
 
 /// The method called `name`.
 pub fn method(name: &str) -> Result<&'static SkinningMethod, Error> {
@@ -49,12 +59,32 @@ pub fn method(name: &str) -> Result<&'static SkinningMethod, Error> {
     })
 }
 
+/// Writes `vertex(index, influences, rest position)` for every vertex, in threads where that pays.
+fn each_vertex(
+    input: &SkinningInput,
+    posed: &mut [[f32; 3]],
+    vertex: impl Fn(usize, &[(u32, f32)], [f32; 3]) -> [f32; 3] + Sync,
+) {
+    let chunk = if posed.len() < PARALLEL_FROM { PARALLEL_FROM } else { 2048 };
+    let pose_chunk = |(index, chunk_out): (usize, &mut [[f32; 3]])| {
+        for (i, out) in chunk_out.iter_mut().enumerate() {
+            let i = index * chunk + i;
+            *out = vertex(i, input.weights.row(i), input.rest_skin[i]);
+        }
+    };
+    if posed.len() < PARALLEL_FROM {
+        posed.chunks_mut(chunk).enumerate().for_each(pose_chunk);
+    } else {
+        posed.par_chunks_mut(chunk).enumerate().for_each(pose_chunk);
+    }
+}
+
 /// Ω in single precision, as the frame reads it: the influences of vertex `i` are entries
-/// `starts[i]..starts[i + 1]`.
+/// `starts[i]..starts[i + 1]`, the largest (the first of equal ones) in front.
 #[derive(Debug, Clone)]
 pub struct PackedWeights {
-    pub(crate) starts: Vec<u32>,
-    pub(crate) influences: Vec<(u32, f32)>,
+    starts: Vec<u32>,
+    influences: Vec<(u32, f32)>,
 }
 
 impl PackedWeights {
@@ -62,11 +92,21 @@ impl PackedWeights {
     pub fn new(weights: &SkinWeights) -> Self {
         let mut packed = Self { starts: vec![0], influences: Vec::new() };
         for vertex in 0..weights.len() {
-            packed
-                .influences
-                .extend(weights.row(vertex).iter().map(|&(joint, weight)| (joint, weight as f32)));
+            let start = packed.influences.len();
+            let row = weights.row(vertex).iter().map(|&(joint, weight)| (joint, weight as f32));
+            packed.influences.extend(row);
+            let row = &mut packed.influences[start..];
+            if let Some(largest) = (0..row.len()).rev().max_by(|&a, &b| row[a].1.total_cmp(&row[b].1)) {
+                row[..=largest].rotate_right(1);
+            }
             packed.starts.push(packed.influences.len() as u32);
         }
         packed
+    }
+
+    /// The influences of `vertex`.
+    #[inline]
+    pub fn row(&self, vertex: usize) -> &[(u32, f32)] {
+        &self.influences[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
     }
 }

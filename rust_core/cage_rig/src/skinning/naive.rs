@@ -1,13 +1,13 @@
 //! Oracles: each method straight from its equation, in double precision.
 
-use crate::points::{Point, Transform};
+use crate::points::{Matrix3, Point, Transform};
 use crate::rows::Rows;
 
 /// M′ from T, Ω (`#M by #J`, rows that sum to 1 or 0) and M.
 pub(crate) type Oracle = fn(&[Transform], &Rows, &[Point]) -> Vec<Point>;
 
 /// The oracle of each method in `METHODS`.
-pub(crate) const ORACLES: &[(&str, Oracle)] = &[("lbs", lbs)];
+pub(crate) const ORACLES: &[(&str, Oracle)] = &[("lbs", lbs), ("dqs", dqs)];
 
 /// [CTL*20] Eq. (3): v′ = Σ_j ω_ij (R_j v + t_j); a row of zeros leaves its vertex alone.
 pub(crate) fn lbs(transforms: &[Transform], weights: &Rows, rest: &[Point]) -> Vec<Point> {
@@ -20,4 +20,79 @@ pub(crate) fn lbs(transforms: &[Transform], weights: &Rows, rest: &[Point]) -> V
         posed.push(if weights.row(i).iter().all(|w| *w == 0.0) { *v } else { moved });
     }
     posed
+}
+
+/// [KCZO08], Eq. (4) of [CTL*20], with the scale of T_j = R_j S_j applied to v first and its
+/// displacement counted as translation: τ_j(v) = T_j(v) − R_j v.
+pub(crate) fn dqs(transforms: &[Transform], weights: &Rows, rest: &[Point]) -> Vec<Point> {
+    let turns: Vec<Matrix3> = transforms.iter().map(|t| polar(&t.linear)).collect();
+    let real: Vec<Quaternion> = turns.iter().map(quaternion).collect();
+    let mut posed = Vec::new();
+    for (i, v) in rest.iter().enumerate() {
+        let signs = signs(weights.row(i), &real);
+        let (mut q, mut d) = ([0.0; 4], [0.0; 4]);
+        for (j, t) in transforms.iter().enumerate() {
+            let step = t.linear * v + t.translation - turns[j] * v;
+            let dual = times([0.0, step.x / 2.0, step.y / 2.0, step.z / 2.0], real[j]);
+            for k in 0..4 {
+                q[k] += weights.row(i)[j] * signs[j] * real[j][k];
+                d[k] += weights.row(i)[j] * signs[j] * dual[k];
+            }
+        }
+        let size: f64 = q.iter().map(|x| x * x).sum();
+        // q v q* + 2 d q*, over |q|².
+        let conjugate = [q[0], -q[1], -q[2], -q[3]];
+        let turned = times(times(q, [0.0, v.x, v.y, v.z]), conjugate);
+        let moved = times(d, conjugate);
+        posed.push(if size == 0.0 {
+            *v
+        } else {
+            Point::from_fn(|k, _| (turned[k + 1] + 2.0 * moved[k + 1]) / size)
+        });
+    }
+    posed
+}
+
+/// w, x, y, z.
+type Quaternion = [f64; 4];
+
+fn times(a: Quaternion, b: Quaternion) -> Quaternion {
+    [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+}
+
+/// The sign of each bone's quaternion that is nearer to that of the largest weight.
+fn signs(weights: &[f64], real: &[Quaternion]) -> Vec<f64> {
+    let largest = weights.iter().fold(0.0, |most: f64, w| most.max(*w));
+    let pivot = real[weights.iter().position(|w| *w == largest).unwrap_or(0)];
+    real.iter().map(|q| (0..4).map(|k| q[k] * pivot[k]).sum::<f64>()).map(f64::signum).collect()
+}
+
+/// The rotation of the polar decomposition by Newton's iteration X ← (X + X⁻ᵀ) / 2, of −L where L
+/// mirrors.
+fn polar(linear: &Matrix3) -> Matrix3 {
+    let mut x = if linear.determinant() < 0.0 { -linear } else { *linear };
+    for _ in 0..100 {
+        x = (x + x.transpose().try_inverse().expect("an invertible pose")) / 2.0;
+    }
+    x
+}
+
+/// The quaternion of a rotation from the largest of its four squares [Shepperd 1978].
+fn quaternion(m: &Matrix3) -> Quaternion {
+    let trace = m.trace();
+    let squares: [f64; 4] = std::array::from_fn(|k| match k {
+        0 => 1.0 + trace,
+        k => 1.0 - trace + 2.0 * m[(k - 1, k - 1)],
+    });
+    let (a, b, c) = (m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]);
+    let (d, e, f) = (m[(1, 0)] + m[(0, 1)], m[(2, 0)] + m[(0, 2)], m[(2, 1)] + m[(1, 2)]);
+    let largest = (0..4).fold(0, |best, k| if squares[k] > squares[best] { k } else { best });
+    let row =
+        [[squares[0], a, b, c], [a, squares[1], d, e], [b, d, squares[2], f], [c, e, f, squares[3]]][largest];
+    row.map(|x| x / (2.0 * squares[largest].sqrt()))
 }

@@ -2,8 +2,8 @@
 
 use super::naive::ORACLES;
 use super::{method, PackedWeights, SkinningInput, SkinningMethod, METHODS};
-use crate::fixtures::{self, arm, Fixture};
-use crate::points::{to_f32, Point, Transform};
+use crate::fixtures::{self, arm, random, Fixture};
+use crate::points::{to_f32, Matrix3, Point, Transform};
 use crate::rows::Rows;
 use crate::skinning::lbs::pose_points;
 use crate::weights::SkinWeights;
@@ -23,6 +23,30 @@ fn posed(method: &SkinningMethod, fixture: &Fixture, transforms: &[Transform]) -
     out
 }
 
+/// The project's fixtures and some random ones (forests, empty rows, one bone, many).
+fn rigs() -> Vec<Fixture> {
+    let mut rigs = fixtures::all();
+    for seed in 0..12 {
+        let (skin_vertices, joints) = (60, 1 + 3 * seed as usize);
+        rigs.push(random::rig(random::Recipe { skin_vertices, joints, cage_level: 0, seed }));
+    }
+    rigs
+}
+
+/// Frame against oracle, relative to the size of the posed skin.
+fn frame_error(method: &SkinningMethod, fixture: &Fixture, transforms: &[Transform]) -> f64 {
+    let oracle = ORACLES.iter().find(|(name, _)| *name == method.name).expect("every method has an oracle").1;
+    let expected = oracle(transforms, &normalised(fixture), &fixture.skin);
+    let frame = fixtures::points(&posed(method, fixture, transforms));
+    fixtures::distance(&frame, &expected) / fixture.size().max(crate::bounding_diagonal(&expected))
+}
+
+/// The reflection x ↦ c − x along the first axis.
+fn mirror() -> Transform {
+    let linear = Matrix3::from_diagonal(&Point::new(-1.0, 1.0, 1.0));
+    Transform { linear, translation: Point::new(0.4, 0.0, 0.0) }
+}
+
 /// Ω as the oracle wants it: dense, every row 1 or 0.
 fn normalised(fixture: &Fixture) -> Rows {
     let mut dense = fixture.weights.clone();
@@ -36,7 +60,7 @@ fn normalised(fixture: &Fixture) -> Rows {
 #[test]
 fn identity_pose_leaves_the_rest_pose() {
     for method in METHODS {
-        for fixture in fixtures::all() {
+        for fixture in rigs() {
             let identity = vec![Transform::identity(); fixture.joints.len()];
             assert_eq!(posed(method, &fixture, &identity), to_f32(&fixture.skin), "{}", fixture.name);
         }
@@ -46,7 +70,7 @@ fn identity_pose_leaves_the_rest_pose() {
 #[test]
 fn one_rigid_motion_for_all_bones_moves_weighted_vertices_rigidly() {
     for method in METHODS {
-        for fixture in fixtures::all() {
+        for fixture in rigs() {
             let motion = fixtures::turn(Point::new(0.3, 0.2, 0.1), Point::new(1.0, 2.0, 3.0), 2.0);
             let moved = fixtures::points(&posed(method, &fixture, &vec![motion; fixture.joints.len()]));
             let weights = weights(&fixture);
@@ -61,16 +85,185 @@ fn one_rigid_motion_for_all_bones_moves_weighted_vertices_rigidly() {
 #[test]
 fn every_method_agrees_with_its_oracle_to_frame_precision() {
     for method in METHODS {
-        let oracle =
-            ORACLES.iter().find(|(name, _)| *name == method.name).expect("every method has an oracle").1;
-        for fixture in fixtures::all() {
-            let pose = fixtures::lively_pose(&fixture, 1.0);
-            let expected = oracle(&pose, &normalised(&fixture), &fixture.skin);
-            let frame = fixtures::points(&posed(method, &fixture, &pose));
-            let error = fixtures::distance(&frame, &expected) / fixture.size();
-            assert!(error <= FRAME, "{} {}: {error:e}", method.name, fixture.name);
+        for fixture in rigs() {
+            for (pose, what) in [
+                (fixtures::lively_pose(&fixture, 1.0), "lively"),
+                (random::pose(&fixture, 3.1, 5), "random"),
+                (fixtures::compose_all(&mirror(), &random::pose(&fixture, 2.0, 6)), "mirrored"),
+            ] {
+                let error = frame_error(method, &fixture, &pose);
+                assert!(error <= FRAME, "{} {} {what}: {error:e}", method.name, fixture.name);
+            }
         }
     }
+}
+
+#[test]
+fn vertices_of_one_bone_go_where_the_bone_takes_them() {
+    for method in METHODS {
+        for mut fixture in rigs() {
+            let joints = fixture.joints.len();
+            for i in 0..fixture.skin.len() {
+                fixture.weights.row_mut(i).fill(0.0);
+                fixture.weights.row_mut(i)[i % joints] = 0.7;
+            }
+            let pose = fixtures::compose_all(&mirror(), &random::pose(&fixture, 3.1, 7));
+            let moved = fixtures::points(&posed(method, &fixture, &pose));
+            let wanted: Vec<Point> =
+                fixture.skin.iter().enumerate().map(|(i, v)| pose[i % joints].apply(v)).collect();
+            let size = fixture.size().max(crate::bounding_diagonal(&wanted));
+            assert!(fixtures::distance(&moved, &wanted) <= FRAME * size, "{} {}", method.name, fixture.name);
+        }
+    }
+}
+
+#[test]
+fn one_affine_map_for_all_bones_moves_weighted_vertices_by_it() {
+    let linear = fixtures::rotation(Point::new(1.0, 2.0, 3.0), 2.0)
+        * Matrix3::new(1.2, 0.3, 0.0, 0.3, 0.8, 0.1, 0.0, 0.1, 1.5);
+    let map = Transform { linear, translation: Point::new(0.3, 0.2, 0.1) };
+    for method in METHODS {
+        for fixture in rigs() {
+            let moved = fixtures::points(&posed(method, &fixture, &vec![map; fixture.joints.len()]));
+            for (i, v) in
+                fixture.skin.iter().enumerate().filter(|(i, _)| !weights(&fixture).row(*i).is_empty())
+            {
+                assert!((moved[i] - map.apply(v)).norm() <= 2.0 * FRAME * fixture.size(), "{}", method.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn bones_that_only_scale_and_move_blend_linearly() {
+    for method in METHODS {
+        for fixture in rigs() {
+            let mut random = random::Random::new(8);
+            let pose: Vec<Transform> = (0..fixture.joints.len())
+                .map(|_| Transform {
+                    linear: Matrix3::from_diagonal(&(Point::repeat(1.0) + random.point() * 0.5)),
+                    translation: random.point() * 0.2,
+                })
+                .collect();
+            let expected = super::naive::lbs(&pose, &normalised(&fixture), &fixture.skin);
+            let found = fixtures::points(&posed(method, &fixture, &pose));
+            assert!(fixtures::distance(&found, &expected) <= 2.0 * FRAME * fixture.size(), "{}", method.name);
+        }
+    }
+}
+
+#[test]
+fn moving_the_whole_scene_moves_the_result() {
+    // T_j seen from elsewhere, G T_j G⁻¹: no method may depend on where the origin is.
+    let scene = fixtures::turn(Point::new(0.5, -0.3, 0.2), Point::new(1.0, -2.0, 0.5), 1.1);
+    let back = fixtures::turn(Point::new(0.5, -0.3, 0.2), Point::new(1.0, -2.0, 0.5), -1.1);
+    for method in METHODS {
+        for fixture in rigs() {
+            let pose = random::pose(&fixture, 2.5, 3);
+            let there: Vec<Transform> =
+                pose.iter().map(|t| fixtures::compose(&scene, &fixtures::compose(t, &back))).collect();
+            let moved =
+                Fixture { skin: fixture.skin.iter().map(|v| scene.apply(v)).collect(), ..fixture.clone() };
+            let here = fixtures::points(&posed(method, &fixture, &pose));
+            let expected: Vec<Point> = here.iter().map(|v| scene.apply(v)).collect();
+            let found = fixtures::points(&posed(method, &moved, &there));
+            let size = fixture.size().max(crate::bounding_diagonal(&expected));
+            assert!(fixtures::distance(&found, &expected) <= 2.0 * FRAME * size, "{}", method.name);
+        }
+    }
+}
+
+#[test]
+fn the_order_of_the_bones_does_not_matter() {
+    for method in METHODS {
+        for fixture in rigs() {
+            let joints = fixture.joints.len();
+            let order: Vec<usize> = (0..joints).rev().collect();
+            let mut weights = fixture.weights.clone();
+            for i in 0..fixture.skin.len() {
+                (0..joints).for_each(|j| weights.row_mut(i)[j] = fixture.weights.row(i)[order[j]]);
+            }
+            let shuffled = Fixture { weights, ..fixture.clone() };
+            let pose = random::pose(&fixture, 3.1, 9);
+            let turned: Vec<Transform> = order.iter().map(|&j| pose[j]).collect();
+            let (a, b) = (posed(method, &fixture, &pose), posed(method, &shuffled, &turned));
+            let (a, b) = (fixtures::points(&a), fixtures::points(&b));
+            let size = fixture.size().max(crate::bounding_diagonal(&a));
+            assert!(fixtures::distance(&a, &b) <= FRAME * size, "{} {}", method.name, fixture.name);
+        }
+    }
+}
+
+#[test]
+fn bones_turned_to_either_side_of_half_a_turn_meet_in_between() {
+    // 175° and 185° are 10° apart, though their quaternions may point away from each other; so are
+    // 350° and 0°. Methods that blend rotations keep the length of what they turn.
+    let v = Point::new(0.0, 1.0, 0.0);
+    for method in METHODS.iter().filter(|method| method.name != "lbs") {
+        for (a, b) in [(175.0, 185.0), (350.0, 0.0), (350.0, 10.0), (-170.0, 170.0), (90.0, 355.0)] {
+            let angle = |degrees: f64| degrees.to_radians();
+            let pose = [angle(a), angle(b)].map(|angle| fixtures::turn(Point::zeros(), Point::x(), angle));
+            let fixture = Fixture {
+                skin: vec![v],
+                weights: Rows::from_vec(1, 2, vec![0.5, 0.5]).expect("one row"),
+                ..fixtures::shapes::bar()
+            };
+            let found = fixtures::points(&posed(method, &fixture, &pose))[0];
+            let turned = pose.map(|t| t.apply(&v));
+            let between = (turned[0] + turned[1]).normalize();
+            assert!((found - between).norm() < 1e-6, "{} {a} {b}: {found}", method.name);
+        }
+    }
+}
+
+#[test]
+fn a_squashed_bone_gives_finite_numbers() {
+    for method in METHODS {
+        let fixture = fixtures::shapes::bar();
+        for squash in [Matrix3::zeros(), Matrix3::from_diagonal(&Point::new(1.0, 0.0, 1.0))] {
+            let mut pose = fixtures::lively_pose(&fixture, 1.0);
+            pose[1].linear = squash;
+            assert!(
+                posed(method, &fixture, &pose).iter().flatten().all(|x| x.is_finite()),
+                "{}",
+                method.name
+            );
+        }
+    }
+}
+
+#[test]
+fn what_the_weights_lack_to_one_stands_still() {
+    // A row of half a bone blends as if an unmoved bone had the other half.
+    let fixture = fixtures::shapes::bar();
+    let pose = random::pose(&fixture, 2.5, 2);
+    let mut partial = Rows::zeros(fixture.skin.len(), 3);
+    let mut complete = Rows::zeros(fixture.skin.len(), 4);
+    for i in 0..fixture.skin.len() {
+        for (j, weight) in [(0, 0.45), (1, 0.35)] {
+            partial.row_mut(i)[j] = weight;
+            complete.row_mut(i)[j] = weight;
+        }
+        complete.row_mut(i)[3] = 0.2;
+    }
+    let packed = |rows: &Rows| PackedWeights::new(&SkinWeights::from_blended(rows));
+    let still = [pose.clone(), vec![Transform::identity()]].concat();
+    let rest = to_f32(&fixture.skin);
+    for method in METHODS {
+        let mut out = [rest.clone(), rest.clone()];
+        for (out, (weights, transforms)) in out.iter_mut().zip([(&partial, &pose), (&complete, &still)]) {
+            let weights = packed(weights);
+            (method.pose)(&SkinningInput { transforms, weights: &weights, rest_skin: &rest }, out);
+        }
+        let [a, b] = out.map(|out| fixtures::points(&out));
+        assert!(fixtures::distance(&a, &b) <= FRAME * fixture.size(), "{}", method.name);
+    }
+}
+
+#[test]
+fn numbers_and_names_are_what_files_have() {
+    let table: Vec<_> = METHODS.iter().map(|method| (method.number, method.name)).collect();
+    assert_eq!(table, [(0, "lbs"), (1, "dqs")]);
 }
 
 #[test]
@@ -106,22 +299,25 @@ fn double_precision_blending_equals_the_oracle() {
 #[test]
 fn an_unknown_method_is_refused_with_the_known_ones() {
     let message = method("ragdoll").map(|_| ()).expect_err("there is none").to_string();
-    assert!(message.contains("ragdoll") && message.contains("lbs"), "{message}");
+    assert!(message.contains("ragdoll") && message.contains("lbs, dqs"), "{message}");
 }
 
 #[test]
-fn linear_blending_equals_the_reference_poses_of_the_arm() {
+fn every_method_equals_the_reference_poses_of_the_arm() {
     if !arm::is_here() {
         return;
     }
     let fixture = arm::fixture();
     let mut poses = arm::open("poses");
-    let (transforms, expected) = (poses.poses("T_skin"), poses.point_lists("Mp_lbs"));
+    let transforms = poses.poses("T_skin");
     assert_eq!(transforms.len(), 8);
-    for (pose, expected) in transforms.iter().zip(&expected) {
-        let oracle = super::naive::lbs(pose, &normalised(&fixture), &fixture.skin);
-        assert!(fixtures::distance(&oracle, expected) <= 1e-9);
-        let frame = fixtures::points(&posed(&METHODS[0], &fixture, pose));
-        assert!(fixtures::distance(&frame, expected) <= FRAME * fixture.size());
+    for (method, (name, oracle)) in METHODS.iter().zip(ORACLES) {
+        let reference = poses.point_lists(&format!("Mp_{name}"));
+        for (pose, expected) in transforms.iter().zip(&reference) {
+            let exact = oracle(pose, &normalised(&fixture), &fixture.skin);
+            assert!(fixtures::distance(&exact, expected) <= 1e-9);
+            let frame = fixtures::points(&posed(method, &fixture, pose));
+            assert!(fixtures::distance(&frame, expected) <= FRAME * fixture.size());
+        }
     }
 }

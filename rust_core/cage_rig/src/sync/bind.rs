@@ -32,7 +32,7 @@ pub struct BindInput {
     pub skeleton: Skeleton,
     /// C₀ and its faces.
     pub cage: Cage,
-    /// How bones move the skin.
+    /// How bones move the skin, to begin with.
     pub method: &'static SkinningMethod,
     /// How the cage moves the skin.
     pub coordinates: &'static CoordinateKind,
@@ -102,7 +102,6 @@ pub struct Report {
 /// Everything computed at bind; never changes.
 #[derive(Debug, Clone)]
 pub struct Binding {
-    pub(super) method: &'static SkinningMethod,
     pub(super) cage: Cage,
     pub(super) cage_coords: Rows,
     pub(super) center_coords: Option<Rows>,
@@ -163,7 +162,6 @@ impl Binding {
         report.anchor_condition = cage_updater.condition();
         report.regularised = cage_updater.attenuated();
         Ok(Self {
-            method: input.method,
             center_coords: checked(known.center_coords, "center_coords", rows, columns)?,
             anchors: chosen.rows,
             rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords),

@@ -32,7 +32,7 @@ use crate::cage::Cage;
 use crate::error::{Error, PoseError, SkinError};
 use crate::points::{bounding_diagonal, first_not_finite, to_f32, Matrix3, Point, Transform};
 use crate::rows::Rows;
-use crate::skinning::SkinningInput;
+use crate::skinning::{SkinningInput, SkinningMethod};
 use cage_reverser::CageReverser;
 use skeleton_updater::JointMotion;
 
@@ -72,6 +72,7 @@ struct Stale {
 #[derive(Debug, Clone)]
 pub struct CoupledRig {
     binding: Binding,
+    method: &'static SkinningMethod,
     rest_cage: Vec<Point>,
     motions: Vec<JointMotion>,
     offsets: Option<Vec<[f32; 3]>>,
@@ -88,6 +89,7 @@ pub struct CoupledRig {
 impl CoupledRig {
     /// Binds: everything is precomputed here.
     pub fn new(input: BindInput) -> Result<Self, Error> {
+        let method = input.method;
         let binding = Binding::new(input)?;
         let joints = binding.skeleton_updater.joints(binding.cage.vertices());
         let rest = binding.rest_skin.at_bind().to_vec();
@@ -103,6 +105,7 @@ impl CoupledRig {
             stale: Stale { rest_skin: false, posed_skin: false, posed_cage: false },
             reverser: None,
             work: Work { anchor_factorisations: 1, ..Work::default() },
+            method,
             binding,
         })
     }
@@ -168,6 +171,20 @@ impl CoupledRig {
             self.stale.posed_skin = true;
         }
         Ok(())
+    }
+
+    /// How bones move the visible skin from now on. Nothing else depends on it: cages, joints and
+    /// transforms stay as they are.
+    pub fn set_method(&mut self, method: &'static SkinningMethod) {
+        if method.number != self.method.number {
+            self.method = method;
+            self.stale.posed_skin = true;
+        }
+    }
+
+    /// How bones move the visible skin.
+    pub fn method(&self) -> &'static SkinningMethod {
+        self.method
     }
 
     /// The only place that knows what follows from what. What is given and equal to what is there
@@ -279,7 +296,7 @@ impl CoupledRig {
         if self.stale.posed_skin {
             let weights = &self.binding.packed_weights;
             let input = SkinningInput { transforms: &self.transforms, weights, rest_skin: &self.rest_skin };
-            (self.binding.method.pose)(&input, &mut self.posed_skin);
+            (self.method.pose)(&input, &mut self.posed_skin);
             self.work.skin_passes += 1;
             self.stale.posed_skin = false;
         }

@@ -73,6 +73,11 @@ pub fn compose(outer: &Transform, inner: &Transform) -> Transform {
     Transform { linear: outer.linear * inner.linear, translation: outer.apply(&inner.translation) }
 }
 
+/// `outer` after each of `inner`.
+pub fn compose_all(outer: &Transform, inner: &[Transform]) -> Vec<Transform> {
+    inner.iter().map(|inner| compose(outer, inner)).collect()
+}
+
 /// Transforms of the whole skeleton from one local transform per joint (measured at rest places).
 pub fn forward(fixture: &Fixture, local: &[Transform]) -> Vec<Transform> {
     let skeleton =
