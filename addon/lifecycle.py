@@ -49,6 +49,8 @@ def bind(
     session = _compute(cage, bound)
     settings = cage.cage_rig
     settings.version, settings.armature = props.VERSION, armature_object
+    if all(modifier.preserves_volume(obj, armature_object) for obj in skins):
+        settings.method = "DQS"
     for obj in skins:
         settings.skins.add().object = obj
     try:

@@ -24,6 +24,7 @@ OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 # Numbers never move: they are what files store.
 METHODS = [
     ("LBS", "Linear", "Linear blend skinning: what Blender's Armature modifier does by default", 0),
+    ("DQS", "Dual Quaternion", "Keeps the volume of twisted and bent limbs, as the modifier's Preserve Volume", 1),
 ]
 STATES = [
     ("NONE", "Not Bound", "This object is not the cage of a rig", 0),
@@ -78,7 +79,12 @@ class CageRigSettings(bpy.types.PropertyGroup):
     state: EnumProperty(items=STATES, name="State", default="NONE", override=OVERRIDABLE)
     message: StringProperty(name="Message", override=OVERRIDABLE)
     method: EnumProperty(
-        items=METHODS, name="Method", description="How bones deform the skin", default="LBS", override=OVERRIDABLE
+        items=METHODS,
+        name="Method",
+        description="How bones deform the skin",
+        default="LBS",
+        update=_tag,
+        override=OVERRIDABLE,
     )
     influence: FloatProperty(
         name="Influence",

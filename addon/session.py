@@ -121,6 +121,13 @@ class Session:
         self.revision += 1
 
     @_door
+    def set_method(self, name: str) -> None:
+        """Choose how bones deform the skin, one of the core's `skinning_methods()`; free where it is so already."""
+        if name != self.rig.method:
+            self.rig.set_method(name)
+            self.revision += 1
+
+    @_door
     def edit_posed_cage(self, posed_cage: Points) -> NDArray[np.float64]:
         """Move the posed cage there; returns the rest cage (`#C by 3`, rig space) that puts it there."""
         if self.influence < 1e-3:

@@ -193,7 +193,9 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     if not complete:
         _ask_again(cage)
     transforms, rest_joints = _read_pose(cage, running, depsgraph)
-    influence = float(cage.evaluated_get(depsgraph).cage_rig.influence)
+    shown = cage.evaluated_get(depsgraph).cage_rig  # both may be animated
+    influence = float(shown.influence)
+    session.set_method(shown.method.lower())
     rest = _read_rest_cage(cage, depsgraph)
     if len(rest) != len(session.snapshot.cage):
         raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")

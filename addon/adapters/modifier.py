@@ -153,6 +153,12 @@ def suspend_armature(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
             modifier.show_viewport = modifier.show_render = False
 
 
+def preserves_volume(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    """Whether the object's modifier of this armature has Preserve Volume on."""
+    ours = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object == armature]
+    return bool(ours) and all(m.use_deform_preserve_volume for m in ours)
+
+
 def show_suspended(obj: bpy.types.Object, shown: bool) -> None:
     """While a rig is paused its suspended modifiers do their work again (`shown`), as they were before the bind."""
     for record in obj.cage_rig.suspended:

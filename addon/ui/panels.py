@@ -51,6 +51,7 @@ def _draw_settings(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
     column = layout.column()
     column.use_property_split = True
     column.use_property_decorate = False
+    column.prop(settings, "method")
     column.prop(settings, "influence", slider=True)
     parts = layout.column(align=True)
     _draw_part(parts, cage, "Rest Cage", "MESH_CUBE")
