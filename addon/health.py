@@ -79,6 +79,11 @@ def _skins_problem(cage: bpy.types.Object) -> str:
         snapshot = cage.cage_rig.skins[index].snapshot
         if snapshot is None:
             return f"What was bound of '{obj.name}' is lost; press Rebind"
+        if obj.data.library is not None:
+            return (
+                f"The mesh of '{obj.name}' is linked from '{obj.data.library.name}', where Cage Rig can't write; "
+                "append the character, or make it local"
+            )
         if len(obj.data.vertices) != len(snapshot.vertices):
             return (
                 f"'{obj.name}' has {len(obj.data.vertices)} vertices, it had {len(snapshot.vertices)} "

@@ -13,12 +13,14 @@ import bpy
 
 from .adapters import modifier
 
+Key = tuple[str, str | None]  # an object's name and the path of its library
+
 
 @dataclass
 class _Found:
     count: int = -1  # objects in the file when it was looked through
-    names: list[str] = field(default_factory=list)
-    participants: dict[int, set[str]] = field(default_factory=dict)  # session uid -> names of rest cages
+    names: list[Key] = field(default_factory=list)
+    participants: dict[int, set[Key]] = field(default_factory=dict)  # session uid -> rest cages
 
 
 _found = _Found()
@@ -36,11 +38,21 @@ def rigs() -> list[bpy.types.Object]:
     return _cages(_found.names)
 
 
-def _cages(names: list[str]) -> list[bpy.types.Object]:
-    cages = [bpy.data.objects.get(name) for name in names]
+def key_of(obj: bpy.types.Object) -> Key:
+    """By what an object is found again: a linked one may share its name with a local one."""
+    return obj.name, obj.library.filepath if obj.library else None
+
+
+def find(key: Key) -> bpy.types.Object | None:
+    """The object of this key, or None."""
+    return bpy.data.objects.get(key)
+
+
+def _cages(keys: list[Key]) -> list[bpy.types.Object]:
+    cages = [find(key) for key in keys]
     if any(cage is None or not is_rig(cage) for cage in cages):  # renamed or gone
         _look()
-        return [bpy.data.objects[name] for name in _found.names]
+        return [bpy.data.objects[key] for key in _found.names]
     return cages
 
 
@@ -55,10 +67,10 @@ def touched(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
         _look()
     if not _found.participants:
         return []
-    names: set[str] = set()
+    names: set[Key] = set()
     for update in depsgraph.updates:
         names |= _found.participants.get(update.id.original.session_uid, set())
-    return _cages(sorted(names)) if names else []
+    return _cages([key for key in _found.names if key in names]) if names else []
 
 
 def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
@@ -79,12 +91,12 @@ def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
 def _look() -> None:
     _found.count = len(bpy.data.objects)
     cages = [obj for obj in bpy.data.objects if is_rig(obj)]
-    _found.names = [cage.name for cage in cages]
+    _found.names = [key_of(cage) for cage in cages]
     _found.participants = {}
     _release_strays()
     for cage in cages:
         for datablock in participants(cage):
-            _found.participants.setdefault(datablock.session_uid, set()).add(cage.name)
+            _found.participants.setdefault(datablock.session_uid, set()).add(key_of(cage))
 
 
 def _release_strays() -> None:

@@ -53,7 +53,7 @@ class _Running:
 _running: dict[int, _Running] = {}
 _busy = False
 _restoring = False
-_again: set[str] = set()  # rest cages whose rigs need one more update
+_again: set[registry.Key] = set()  # rest cages whose rigs need one more update
 
 
 def forget() -> None:
@@ -73,7 +73,9 @@ def edited(depsgraph: bpy.types.Depsgraph) -> None:
     """After an update of the viewport: sync the rigs that it touched."""
     event = Event.RESTORED if _restoring else Event.EDIT
     cages = registry.touched(depsgraph)
-    cages += [cage for cage in registry.rigs() if cage.name in _again and cage not in cages] if _again else []
+    cages += (
+        [cage for cage in registry.rigs() if registry.key_of(cage) in _again and cage not in cages] if _again else []
+    )
     _again.clear()
     for cage in cages:
         update(cage, depsgraph, event)
@@ -188,7 +190,7 @@ def _start(cage: bpy.types.Object) -> _Running:
 def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:
     """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
     session, settings = running.session, cage.cage_rig
-    offsets, complete = skins.offsets(cage, session, depsgraph, readable=cage.name not in _again)
+    offsets, complete = skins.offsets(cage, session, depsgraph, readable=registry.key_of(cage) not in _again)
     session.offset_skins(offsets)
     if not complete:
         _ask_again(cage)
@@ -321,14 +323,14 @@ def _read_pose(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.D
 
 def _ask_again(cage: bpy.types.Object) -> None:
     """Have the rig updated once more after this evaluation: a handler can't evaluate."""
-    _again.add(cage.name)
+    _again.add(registry.key_of(cage))
     if not bpy.app.timers.is_registered(_tag_again):
         bpy.app.timers.register(_tag_again, first_interval=0.0)
 
 
 def _tag_again() -> None:
-    for name in _again:
-        cage = bpy.data.objects.get(name)
+    for key in _again:
+        cage = registry.find(key)
         if cage is not None:
             cage.update_tag()
 
