@@ -50,7 +50,16 @@ def _armature_problem(cage: bpy.types.Object) -> str:
     missing = follow_renames(cage)
     if missing:
         return f"Bone '{missing}' of '{obj.name}' was deleted; undo, or press Rebind"
+    bones = obj.data.bones
+    for joint in cage.cage_rig.joints:
+        if joint.weighted and bones[joint.name].bbone_segments > 1:
+            return bendy(obj, joint.name)
     return ""
+
+
+def bendy(obj: bpy.types.Object, bone: str) -> str:
+    """Why a B-bone that deforms can't be followed."""
+    return f"Bone '{bone}' of '{obj.name}' is a B-bone and deforms the skin; set its segments to 1 (Bone, Bendy Bones)"
 
 
 def _cage_problem(cage: bpy.types.Object) -> str:

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import props, sync
+from . import health, props, sync
 from .adapters import armature, modifier, positions, shape_keys, snapshot, vertex_groups
 from .session import Session, SessionError, SkinSnapshot, Snapshot
 
@@ -185,8 +185,11 @@ def _read(
         world = armature.to_array(armature_object.matrix_world)
         to_rig = [_to_rig(obj, world, armature_object.name) for obj in (*skins, cage)]
     parts = [_read_skin(obj, deforming, matrix) for obj, matrix in zip(skins, to_rig, strict=False)]
-    _refuse_bendy(armature_object, rest, parts)
+    _refuse_bones(armature_object, rest, parts)
     for obj in skins:
+        unlike = modifier.unlike_weights(obj, armature_object)
+        if unlike:
+            raise BindError(f"'{obj.name}' can't be bound: {unlike}")
         blocking = modifier.blocking(obj, modifier.place(obj, armature_object))
         if blocking:
             raise BindError(
@@ -207,11 +210,11 @@ def _read(
 
 
 def _to_rig(obj: bpy.types.Object, armature_world: Matrix, armature_name: str) -> Matrix:
-    if abs(np.linalg.det(armature_world[:3, :3])) < 1e-12:
-        raise BindError(f"Armature '{armature_name}' is scaled to nothing; give it a scale")
     world = armature.to_array(obj.matrix_world)
-    if abs(np.linalg.det(world[:3, :3])) < 1e-12:
-        raise BindError(f"'{obj.name}' is scaled to nothing; give it a scale")
+    for name, matrix in ((armature_name, armature_world), (obj.name, world)):
+        scales = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+        if scales[2] <= 1e-6 * scales[0]:
+            raise BindError(f"'{name}' is scaled to nothing along an axis; give it a scale")
     # through float32: what a file keeps
     return (np.linalg.inv(armature_world) @ world).astype(np.float32).astype(np.float64)
 
@@ -233,14 +236,16 @@ def _read_skin(obj: bpy.types.Object, deforming: dict[str, int], to_rig: Matrix)
     return SkinSnapshot(points, positions.read_faces(mesh), (indptr, joints, values))
 
 
-def _refuse_bendy(obj: bpy.types.Object, rest: armature.RestBones, skins: list[SkinSnapshot]) -> None:
+def _refuse_bones(obj: bpy.types.Object, rest: armature.RestBones, skins: list[SkinSnapshot]) -> None:
     used = np.unique(np.concatenate([skin.weights[1] for skin in skins]))
-    bendy = used[rest.segments[used] > 1]
-    if len(bendy):
-        raise BindError(
-            f"Bone '{rest.names[bendy[0]]}' of '{obj.name}' is a B-bone and deforms the skin; "
-            "set its segments to 1 (Bone properties, Bendy Bones)"
-        )
+    for bone in used.tolist():
+        if rest.segments[bone] > 1:
+            raise BindError(health.bendy(obj, rest.names[bone]))
+        if rest.envelopes[bone]:
+            raise BindError(
+                f"Bone '{rest.names[bone]}' of '{obj.name}' multiplies weights by its envelope; "
+                "switch that off (Bone properties, Deform)"
+            )
 
 
 def _compute(cage: bpy.types.Object, bound: _Bound) -> Session:
@@ -286,9 +291,11 @@ def _join(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
 def _write_joints(cage: bpy.types.Object, bound: _Bound) -> None:
     joints = cage.cage_rig.joints
     joints.clear()
+    weighted = set(np.concatenate([skin.weights[1] for skin in bound.snapshot.skins]).tolist())
     for k, name in enumerate(bound.bone_names):
         joint = joints.add()
         joint.name, joint.parent = name, int(bound.snapshot.parents[k])
+        joint.weighted = k in weighted
         joint.head, joint.tail = bound.snapshot.heads[k], bound.snapshot.tails[k]
 
 

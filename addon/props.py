@@ -51,6 +51,7 @@ class CageRigJoint(bpy.types.PropertyGroup):
     parent: IntProperty(name="Parent", default=-1, override=OVERRIDABLE)
     head: FloatVectorProperty(name="Head", description="Rest position in the armature's space", override=OVERRIDABLE)
     tail: FloatVectorProperty(name="Tail", description="Rest tail in the armature's space", override=OVERRIDABLE)
+    weighted: BoolProperty(name="Weighted", description="Whether it moves any skin", override=OVERRIDABLE)
     shift: FloatVectorProperty(
         name="Shift", description="How far Apply Refit has moved the bone since the bind", override=OVERRIDABLE
     )

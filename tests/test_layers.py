@@ -23,7 +23,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "health": ({"bpy", "numpy"}, {"adapters"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "sync": ({"bpy", "numpy"}, {"adapters", "health", "registry", "session", "skins"}),
-    "lifecycle": ({"bpy", "numpy"}, {"adapters", "props", "session", "sync"}),
+    "lifecycle": ({"bpy", "numpy"}, {"adapters", "health", "props", "session", "sync"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),
     "operators": ({"bpy"}, {"lifecycle", "operators", "props", "selection"}),

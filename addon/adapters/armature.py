@@ -27,6 +27,7 @@ class RestBones:
     tails: NDArray[np.float64]  # #J by 3
     deform: NDArray[np.bool_]  # #J
     segments: NDArray[np.int32]  # #J, more than 1 for B-bones
+    envelopes: NDArray[np.bool_]  # #J, weights multiplied by the envelope
 
 
 def read_rest(armature: bpy.types.Armature) -> RestBones:
@@ -45,6 +46,7 @@ def read_rest(armature: bpy.types.Armature) -> RestBones:
         tails,
         np.array([bone.use_deform for bone in bones], bool),
         np.array([bone.bbone_segments for bone in bones], np.int32),
+        np.array([bone.use_envelope_multiply for bone in bones], bool),
     )
 
 
@@ -74,7 +76,7 @@ def new_refit_armature(name: str, source: bpy.types.Armature) -> bpy.types.Armat
     armature = source.copy()
     armature.name = name
     armature.animation_data_clear()
-    armature.display_type = "STICK"
+    armature.display_type, armature.pose_position = "STICK", "POSE"
     for bone in armature.bones:
         bone.color.palette = "THEME04"
     return armature

@@ -153,6 +153,20 @@ def suspend_armature(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
             modifier.show_viewport = modifier.show_render = False
 
 
+def unlike_weights(obj: bpy.types.Object, armature: bpy.types.Object) -> str:
+    """How the object's shown modifiers of this armature do other than its weights say; empty where they don't."""
+    shown = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object == armature]
+    shown = [m for m in shown if m.show_viewport or m.show_render]
+    if len(shown) > 1:
+        return f"modifier '{shown[1].name}' deforms it a second time by the same armature; remove one of them"
+    for modifier in shown:
+        if modifier.use_bone_envelopes or not modifier.use_vertex_groups:
+            return f"modifier '{modifier.name}' uses bone envelopes; let it use vertex groups alone"
+        if modifier.vertex_group:
+            return f"modifier '{modifier.name}' is masked by vertex group '{modifier.vertex_group}'; clear the mask"
+    return ""
+
+
 def preserves_volume(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
     """Whether the object's modifier of this armature has Preserve Volume on."""
     ours = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object == armature]

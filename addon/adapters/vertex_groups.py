@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from .snapshot import Csr
 
+SMALLEST_SUM = 1e-4
+
 
 def read_weights(obj: bpy.types.Object, bone_index: dict[str, int]) -> Csr:
     """Weights of the groups named as deforming bones, as CSR (indptr `#V + 1`, bone indices, values > 0).
 
-    Blender has no bulk access to vertex groups, so this walks the vertices; it runs at bind only.
-    Not normalised. Not in Edit Mode.
+    Blender has no bulk access to vertex groups, so this walks the vertices; it runs at bind only. Not normalised; a
+    vertex whose weights sum to next to nothing has none, as in Blender's Armature modifier. Not in Edit Mode.
     """
     joint_of = np.array([bone_index.get(group.name, -1) for group in obj.vertex_groups] + [-1], np.int64)
     per_vertex = [[(g.group, g.weight) for g in vertex.groups] for vertex in obj.data.vertices]
@@ -26,6 +28,8 @@ def read_weights(obj: bpy.types.Object, bone_index: dict[str, int]) -> Csr:
     group = np.clip(flat[:, 0].astype(np.int64), 0, len(joint_of) - 1)
     joints = joint_of[group]
     keep = (joints >= 0) & (flat[:, 1] > 0.0)
+    total = np.bincount(row[keep], flat[keep, 1], minlength=len(counts))
+    keep &= total[row] > SMALLEST_SUM
     row, joints, values = row[keep], joints[keep], flat[keep, 1]
     indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(counts)))]).astype(np.int64)
     return indptr, joints, values

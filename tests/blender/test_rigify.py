@@ -69,9 +69,6 @@ def test_controls_move_the_skin_as_in_blender(human: Rig) -> None:
         assert frame == FRAMES[0] or truth.motion(human) > 0.05
 
 
-@pytest.mark.xfail(
-    strict=True, reason="refit bones keep 'Local Location' off of the IK controls, so that their locations are misread"
-)
 def test_refit_bones_of_controls_are_the_controls(human: Rig) -> None:
     bpy.context.scene.frame_set(FRAMES[1])
     assert np.abs(truth.refit_heads(human) - truth.pose_heads(human)).max() < 1e-5 * human.size

@@ -15,12 +15,6 @@ from blend_fixtures.build import RigObjects
 
 EVERY = pytest.mark.parametrize("name", rigs.RIGS)
 ORDER = (13, 1, 25, 6, 19)
-TURNED_LOCATIONS = pytest.mark.xfail(
-    strict=True, reason="refit bones keep 'Local Location' off of their bone, so that their locations are misread"
-)
-EVERY_REFIT = pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=TURNED_LOCATIONS) if n == "no_local_location" else n for n in rigs.RIGS]
-)
 
 
 def bound(name: str) -> Rig:
@@ -41,7 +35,7 @@ def test_an_action_plays_as_blenders_armature_modifier(name: str) -> None:
     assert rig.settings.state == "LIVE", rig.settings.message
 
 
-@EVERY_REFIT
+@EVERY
 def test_refit_bones_are_the_pose_bones_at_rest_cage(name: str) -> None:
     rig = bound(name)
     size = truth.Bound.of(rig).size
@@ -63,7 +57,7 @@ def test_a_fat_cage_carries_the_posed_skin(name: str) -> None:
             assert np.abs(live - expected).max() < 1e-5 * before.size, f"frame {frame}"
 
 
-@EVERY_REFIT
+@EVERY
 def test_a_fat_cage_refits_the_joints(name: str) -> None:
     objects = rigs.build_rig(name)
     before = truth.Bound.of(objects)
@@ -127,7 +121,6 @@ def test_bendy_bones_that_move_nothing_are_welcome(spared: str) -> None:
         assert truth.worst_against_blender(rig) < 1e-5, f"frame {frame}"
 
 
-@pytest.mark.xfail(strict=True, reason="segments are looked at when binding only")
 def test_a_bone_made_bendy_after_the_bind_pauses_the_rig() -> None:
     objects = rigs.bendy_bones()
     objects.armature.data.bones["bone.1"].bbone_segments = 1
@@ -137,7 +130,6 @@ def test_a_bone_made_bendy_after_the_bind_pauses_the_rig() -> None:
     assert rig.settings.state == "PAUSED" and "bone.1" in rig.settings.message
 
 
-@pytest.mark.xfail(strict=True, reason="the refit armature is a copy and keeps its Rest Position")
 def test_refit_bones_move_although_bound_in_rest_position() -> None:
     objects = rigs.build_rig("keyed_locations")
     objects.armature.data.pose_position = "REST"
@@ -149,7 +141,6 @@ def test_refit_bones_move_although_bound_in_rest_position() -> None:
     assert np.abs(truth.refit_heads(rig) - truth.pose_heads(rig)).max() < 1e-5 * rig.size
 
 
-@pytest.mark.xfail(strict=True, reason="'scaled to nothing' is measured in metres, not against the other axes")
 def test_a_very_small_armature_object_binds() -> None:
     objects = rigs.build_rig("mirrored_armature")
     objects.armature.scale = (1e-4, 1e-4, 1e-4)
@@ -193,7 +184,6 @@ def deformed_twice(objects: RigObjects) -> str:
     return "Second"
 
 
-@pytest.mark.xfail(strict=True, reason="these settings are not looked at, and the skin moves otherwise than it did")
 @pytest.mark.parametrize(
     "setting", [envelope_multiplied, envelopes_for_the_rest, envelopes_alone, masked_modifier, deformed_twice]
 )
@@ -211,7 +201,6 @@ def test_settings_of_the_armature_modifier_are_honoured_or_refused(setting: Call
         assert np.abs(shown(objects.skins[0]) - blender).max() < 2e-5
 
 
-@pytest.mark.xfail(strict=True, reason="Blender leaves vertices alone whose weights sum to less than 1e-4")
 def test_vertices_with_next_to_no_weight_stay() -> None:
     objects = rigs.build_rig("two_skins_and_a_hidden_bone_collection")
     for skin in objects.skins:
