@@ -55,6 +55,8 @@ class Options(TypedDict, total=False):
     max_anchor_swaps: int
     locality_exponent: float
     min_singular: float
+    center_sigma: float
+    center_bins: int  # 0: exact, slow
 
 class Report(TypedDict):
     cage_turned: bool
@@ -75,6 +77,8 @@ class Work(TypedDict):
     rest_passes: int
     skin_passes: int
     cage_fits: int
+    center_integrations: int
+    center_passes: int
 
 @final
 class CoupledRig:
@@ -93,7 +97,7 @@ class CoupledRig:
         anchors: ArrayLike | None = None,  # (min(#M, #C),) skin vertices
         cage_coords: ArrayLike | None = None,  # (#M, #C)
         joint_coords: ArrayLike | None = None,  # (#J, #C)
-        center_coords: ArrayLike | None = None,  # (#M, #C)
+        center_coords: ArrayLike | None = None,  # (#M, #C), kept for when a method needs it
         options: Options | None = None,
     ) -> CoupledRig: ...
     def pose(
@@ -110,7 +114,7 @@ class CoupledRig:
         rest_joints: ArrayLike | None = None,
     ) -> None: ...
     def offset_rest_skin(self, offsets: ArrayLike | None) -> None: ...
-    def set_method(self, name: str) -> None: ...  # at any time; changes the posed skin alone
+    def set_method(self, name: str) -> None: ...  # at any time; changes the posed skin alone; the first "cor" integrates
     @property
     def method(self) -> str: ...
     def posed_skin_into(self, out: NDArray[Any], start: int = 0) -> None: ...
@@ -135,7 +139,7 @@ class CoupledRig:
     @property
     def joint_coords(self) -> Doubles: ...
     @property
-    def center_coords(self) -> Doubles | None: ...
+    def center_coords(self) -> Doubles | None: ...  # None until given or needed by the method
     @property
     def anchors(self) -> NDArray[np.int64]: ...
     @property

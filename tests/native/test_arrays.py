@@ -141,6 +141,8 @@ def test_faults_of_the_input_have_their_own_exceptions(bar):
         bind(options={"speed": 1})
     with refused(core.CageRigError, "min_singular", "found 2"):
         bind(options={"min_singular": 2.0})
+    with refused(core.CageRigError, "center_sigma", "found 0"):
+        bind(options={"center_sigma": 0.0})
     with refused(core.ArrayError, "skin_faces", "pair", "tuple of 3"):
         bind(skin_faces=(corners, sizes, sizes))
     with refused(core.ArrayError, "skin_faces", "add up"):

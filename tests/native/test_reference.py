@@ -30,7 +30,7 @@ def test_coordinates_and_joints(arm, inputs):
 @pytest.mark.parametrize("method", core.skinning_methods())
 def test_poses(arm, inputs, method):
     poses = arm["poses"]
-    rig = core.CoupledRig(**inputs, anchors=arm["inputs"]["maxvol"], method=method)
+    rig = core.CoupledRig(**inputs, anchors=arm["inputs"]["maxvol"], method=method, center_coords=arm["bind"]["Lambda"])
     for k in range(len(poses["t"])):
         rig.pose(poses["T_skin"][k])
         assert np.abs(rig.posed_skin - poses[f"Mp_{method}"][k]).max() <= 2e-6 * rig.size

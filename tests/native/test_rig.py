@@ -103,9 +103,41 @@ def test_the_method_can_be_changed_at_any_time(bar, bent, method):
 
 def test_an_unknown_method_is_refused_with_the_choices(bar):
     rig = core.CoupledRig(**bar)
-    with pytest.raises(core.CageRigError, match="ragdoll.*lbs, dqs"):
+    with pytest.raises(core.CageRigError, match=r"ragdoll.*lbs, dqs, cor"):
         rig.set_method("ragdoll")
     assert rig.method == "lbs"
+
+
+def test_centers_are_known_once_a_method_has_needed_them(bar, bent):
+    rig = core.CoupledRig(**bar)
+    assert rig.center_coords is None
+    rig.set_method("cor")
+    coords = rig.center_coords
+    assert coords.shape == (124, 16)
+    np.testing.assert_allclose(coords.sum(1), 1, atol=1e-12)
+    # Vertices that blend turn about the axis of the bar.
+    centers = coords @ bar["cage_vertices"]
+    blended = np.abs(bar["skin_vertices"][:, 0] - 5) < 1
+    assert np.abs(centers[blended, 1:]).max() < 0.1
+    rig.set_method("dqs")
+    rig.set_method("cor")
+    rig.pose(bent)
+    read(rig)
+    assert (rig.work["center_integrations"], rig.work["center_passes"]) == (1, 1)
+    given = core.CoupledRig(**bar, method="cor", center_coords=coords)
+    given.pose(bent)
+    np.testing.assert_array_equal(given.posed_skin, rig.posed_skin)
+    assert given.work["center_integrations"] == 0
+
+
+def test_binned_centers_are_near_the_exact_ones(bar):
+    exact, binned, broad = (
+        core.CoupledRig(**bar, method="cor", options=options).center_coords @ bar["cage_vertices"]
+        for options in ({"center_bins": 0}, {}, {"center_sigma": 1.0})
+    )
+    size = np.linalg.norm(np.ptp(bar["skin_vertices"], axis=0))
+    assert 0 < np.abs(binned - exact).max() < 1e-3 * size
+    assert np.abs(broad - exact).max() > 1e-3 * size
 
 
 @pytest.mark.parametrize("method", core.skinning_methods())
@@ -136,6 +168,8 @@ def test_work_and_report_are_plain_dictionaries(bar, bent):
         "rest_passes": 0,
         "skin_passes": 1,
         "cage_fits": 1,
+        "center_integrations": 0,
+        "center_passes": 0,
     }
     rig.pose(bent)
     read(rig)
@@ -197,7 +231,7 @@ def test_a_panic_is_an_exception_and_poisons_the_rig_alone(bar):
 
 
 def test_families_list_their_members():
-    assert core.skinning_methods()[:2] == ["lbs", "dqs"]
+    assert core.skinning_methods() == ["lbs", "dqs", "cor"]
     assert "mean_value" in core.coordinate_kinds()
     assert core.__version__
 

@@ -148,11 +148,38 @@ fn a_method_changes_the_posed_skin_alone_and_at_any_time() {
             let skinned = usize::from(method.name != "lbs");
             assert_eq!(after.skin_passes, before.skin_passes + skinned);
             assert_eq!((after.cage_fits, after.rest_passes), (before.cage_fits, before.rest_passes));
+            let centers = usize::from(method.centers);
+            assert_eq!((after.center_integrations, after.center_passes), (centers, centers));
             changed.set_method(method);
             changed.posed_skin();
             assert_eq!(changed.work(), after, "the same method again is no work");
         }
     }
+}
+
+#[test]
+fn centers_are_integrated_once_and_moved_when_the_cage_is() {
+    let fixture = common::shapes::bar();
+    let [lbs, cor] = ["lbs", "cor"].map(|name| cage_rig::skinning::method(name).expect("it is there"));
+    let mut rig = fixture.rig();
+    assert_eq!((rig.work().center_integrations, rig.center_coords()), (0, None));
+    let mut counts = Vec::new();
+    let cages = [1, 1, 2, 2].map(|seed| nudged(&fixture.cage, 0.1, seed));
+    for (method, (cage, amount)) in [cor, cor, lbs, cor].iter().zip(cages.iter().zip([0.1, 0.2, 0.3, 0.4])) {
+        rig.set_method(method);
+        rig.play(cage, &lively_pose(&fixture, amount), None).expect("a valid frame");
+        rig.posed_skin();
+        counts.push((rig.work().center_integrations, rig.work().center_passes));
+    }
+    assert_eq!(counts, [(1, 1), (1, 1), (1, 1), (1, 2)]);
+    // Given ones are taken as they are.
+    let coords = rig.center_coords().cloned();
+    let mut input = fixture.input();
+    (input.method, input.known.center_coords) = (cor, coords.clone());
+    let mut again = CoupledRig::new(input).expect("it binds");
+    again.play(&cages[3], &lively_pose(&fixture, 0.4), None).expect("a valid frame");
+    assert_eq!(again.posed_skin(), rig.posed_skin());
+    assert_eq!((again.center_coords().cloned(), again.work().center_integrations), (coords, 0));
 }
 
 #[test]

@@ -245,7 +245,7 @@ impl CoupledRig {
         arrays::from_rows(py, &self.with(py, |rig| rig.joint_coords().clone())?)
     }
 
-    /// Center coordinates (#M, #C), a copy, or None.
+    /// Center coordinates (#M, #C), a copy, or None before a method has needed them.
     #[getter]
     fn center_coords<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let coords = self.with(py, |rig| rig.center_coords().cloned())?;
@@ -294,6 +294,8 @@ impl CoupledRig {
         work.set_item("rest_passes", done.rest_passes)?;
         work.set_item("skin_passes", done.skin_passes)?;
         work.set_item("cage_fits", done.cage_fits)?;
+        work.set_item("center_integrations", done.center_integrations)?;
+        work.set_item("center_passes", done.center_passes)?;
         Ok(work)
     }
 
@@ -317,9 +319,11 @@ fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOptions> {
             "max_anchor_swaps" => options.maxvol.max_swaps = value.extract()?,
             "locality_exponent" => options.locality_exponent = value.extract()?,
             "min_singular" => options.min_singular = value.extract()?,
+            "center_sigma" => options.centers.sigma = value.extract()?,
+            "center_bins" => options.centers.bins = value.extract()?,
             unknown => {
                 return Err(CageRigError::new_err(format!(
-                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular"
+                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular, center_sigma, center_bins"
                 )))
             }
         }

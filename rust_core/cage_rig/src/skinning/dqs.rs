@@ -8,7 +8,9 @@
 //! to S_j v; what that moves v by joins the translation, τ_j(v) = T_j(v) − R_j v. Then the rigid
 //! motions (R_j, τ_j) are blended. [KCZO08] §4.2 blends the S_j about the origin, and so depends on
 //! where the origin is; here S_j holds v itself fixed, as in Blender's Preserve Volume. A vertex of
-//! one bone goes where the bone takes it, and bones that only scale and move blend linearly.
+//! one bone goes where the bone takes it, and bones that only scale and move blend linearly. Blender
+//! knows the bones' own axes and keeps theirs where we take the nearest rotation: the two agree but
+//! for sheared and mirrored bones.
 //!
 //! q̂ and −q̂ are the same motion: per vertex each bone takes the sign that is nearer to the bone of
 //! its largest weight (the first of equal ones). What the weights lack to 1 blends in as identity.
@@ -23,36 +25,36 @@ const RIGID: f64 = 1e-7;
 /// Weights that lack less than this to 1 lack nothing but rounding.
 pub(super) const COMPLETE: f32 = 1e-6;
 
-/// Real part, dual part of (R, t).
-const RIGID_SIZE: usize = 8;
-/// The same and the dual part of (1, (L − R) v) as a matrix, columns first.
-const AFFINE_SIZE: usize = 20;
+/// Real part and dual part of (R, t).
+const RIGID_PARTS: usize = 2;
+/// The same and the dual part of (1, (L − R) v) as the columns of a matrix.
+const AFFINE_PARTS: usize = 5;
 
 /// M′ of a frame, in single precision.
 pub fn pose(input: &SkinningInput, posed: &mut [[f32; 3]]) {
-    let bones: Vec<[f64; AFFINE_SIZE]> = input.transforms.iter().map(dual_quaternion).collect();
-    if bones.iter().all(|bone| bone[RIGID_SIZE..].iter().all(|x| x.abs() <= RIGID)) {
-        blend_bones::<RIGID_SIZE>(&bones, input, posed);
+    let bones: Vec<[Quaternion; AFFINE_PARTS]> = input.transforms.iter().map(dual_quaternion).collect();
+    if bones.iter().all(|bone| bone[RIGID_PARTS..].iter().flatten().all(|x| x.abs() <= RIGID)) {
+        blend_bones::<RIGID_PARTS>(&bones, input, posed);
     } else {
-        blend_bones::<AFFINE_SIZE>(&bones, input, posed);
+        blend_bones::<AFFINE_PARTS>(&bones, input, posed);
     }
 }
 
-fn blend_bones<const N: usize>(bones: &[[f64; AFFINE_SIZE]], input: &SkinningInput, posed: &mut [[f32; 3]]) {
-    let bones: Vec<[f32; N]> = bones.iter().map(|bone| std::array::from_fn(|k| bone[k] as f32)).collect();
+fn blend_bones<const N: usize>(
+    bones: &[[Quaternion; AFFINE_PARTS]],
+    input: &SkinningInput,
+    posed: &mut [[f32; 3]],
+) {
+    let single = |bone: &[Quaternion; AFFINE_PARTS]| std::array::from_fn(|k| bone[k].map(|x| x as f32));
+    let bones: Vec<[[f32; 4]; N]> = bones.iter().map(single).collect();
     each_vertex(input, posed, |_, influences, v| moved(&bones, influences, v));
 }
 
-fn dual_quaternion(transform: &Transform) -> [f64; AFFINE_SIZE] {
+fn dual_quaternion(transform: &Transform) -> [Quaternion; AFFINE_PARTS] {
     let q = rotation_of(&transform.linear);
     let sheared: Matrix3 = transform.linear - matrix_of(q);
-    let mut bone = [0.0; AFFINE_SIZE];
-    bone[..4].copy_from_slice(&q);
-    bone[4..8].copy_from_slice(&dual_of(q, transform.translation));
-    for column in 0..3 {
-        bone[8 + 4 * column..][..4].copy_from_slice(&dual_of(q, sheared.column(column).into()));
-    }
-    bone
+    let [x, y, z] = [0, 1, 2].map(|column| dual_of(q, sheared.column(column).into()));
+    [q, dual_of(q, transform.translation), x, y, z]
 }
 
 /// ½ t q.
@@ -64,37 +66,49 @@ fn dual_of([x, y, z, w]: Quaternion, t: Point) -> Quaternion {
 
 /// v′ of one vertex.
 #[inline]
-fn moved<const N: usize>(bones: &[[f32; N]], influences: &[(u32, f32)], v: [f32; 3]) -> [f32; 3] {
+fn moved<const N: usize>(bones: &[[[f32; 4]; N]], influences: &[(u32, f32)], v: [f32; 3]) -> [f32; 3] {
     let Some(&(pivot, _)) = influences.first() else { return v };
-    let pivot = &bones[pivot as usize];
-    let mut blend = [0.0f32; N];
+    let pivot = &bones[pivot as usize][0];
+    let mut blend = [[0.0f32; 4]; N];
     let mut lack = 1.0f32;
     for &(joint, weight) in influences {
         let bone = &bones[joint as usize];
         lack -= weight;
-        let weight = if agree(bone, pivot) { weight } else { -weight };
-        blend.iter_mut().zip(bone).for_each(|(sum, x)| *sum += weight * x);
+        add_weighted(&mut blend, toward(pivot, &bone[0], weight), bone);
     }
     if lack > COMPLETE {
-        blend[3] += lack.copysign(pivot[3]);
+        blend[0][3] += lack.copysign(pivot[3]);
     }
-    let mut dual = [blend[4], blend[5], blend[6], blend[7]];
-    for (column, x) in blend[8..].chunks_exact(4).zip(v) {
+    let mut dual = blend[1];
+    for (column, x) in blend[RIGID_PARTS..].iter().zip(v) {
         dual.iter_mut().zip(column).for_each(|(sum, d)| *sum += d * x);
     }
-    let u = [blend[0], blend[1], blend[2]];
-    let w = blend[3];
+    let (q, d) = (blend[0], dual);
+    let (u, w) = ([q[0], q[1], q[2]], q[3]);
     let turned = cross(u, v);
-    let carried = cross(u, [dual[0], dual[1], dual[2]]);
-    let inner = cross(u, std::array::from_fn(|d| turned[d] + w * v[d]));
-    let scale = 2.0 / (u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + w * w);
-    std::array::from_fn(|d| v[d] + scale * (inner[d] + w * dual[d] - dual[3] * u[d] + carried[d]))
+    // u × (u × v + w v + d_u) in one product.
+    let inner = cross(u, std::array::from_fn(|k| turned[k] + w * v[k] + d[k]));
+    let scale = 2.0 / squared(q);
+    std::array::from_fn(|k| v[k] + scale * (inner[k] + w * d[k] - d[3] * u[k]))
 }
 
-/// Do two quaternions (the first four numbers) lie on the same half of their sphere?
+/// Adds `weight` times the parts of a bone.
 #[inline]
-pub(super) fn agree(a: &[f32], b: &[f32]) -> bool {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] >= 0.0
+pub(super) fn add_weighted<const N: usize>(sum: &mut [[f32; 4]; N], weight: f32, bone: &[[f32; 4]; N]) {
+    for (sum, part) in sum.iter_mut().zip(bone) {
+        sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += weight * x);
+    }
+}
+
+#[inline]
+pub(super) fn squared(q: [f32; 4]) -> f32 {
+    q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+}
+
+/// `weight` with the sign that brings quaternion `q` to the half of the sphere of `pivot`.
+#[inline]
+pub(super) fn toward(pivot: &[f32; 4], q: &[f32; 4], weight: f32) -> f32 {
+    weight.copysign(q[0] * pivot[0] + q[1] * pivot[1] + q[2] * pivot[2] + q[3] * pivot[3])
 }
 
 #[inline]

@@ -4,6 +4,10 @@
 //! transforms, moves it rigidly when all transforms are the same rigid motion, and never moves a
 //! vertex without weights.
 
+#[cfg(test)]
+mod center_tests;
+pub mod centers;
+pub mod cor;
 pub mod dqs;
 pub mod lbs;
 #[cfg(test)]
@@ -29,6 +33,8 @@ pub struct SkinningInput<'a> {
     pub weights: &'a PackedWeights,
     /// M, `#M by 3`, rig space.
     pub rest_skin: &'a [[f32; 3]],
+    /// p, `#M by 3`, rig space; read by methods that have `centers`.
+    pub centers: &'a [[f32; 3]],
 }
 
 /// A skinning method.
@@ -40,14 +46,17 @@ pub struct SkinningMethod {
     pub name: &'static str,
     /// The name people read.
     pub label: &'static str,
+    /// Does it turn about centers of rotation?
+    pub centers: bool,
     /// Writes M′ (`#M by 3`).
     pub pose: fn(&SkinningInput, &mut [[f32; 3]]),
 }
 
 /// Every method there is. The first one is the default; a new one takes the next number.
 pub const METHODS: &[SkinningMethod] = &[
-    SkinningMethod { number: 0, name: "lbs", label: "Linear Blend", pose: lbs::pose },
-    SkinningMethod { number: 1, name: "dqs", label: "Dual Quaternion", pose: dqs::pose },
+    SkinningMethod { number: 0, name: "lbs", label: "Linear Blend", centers: false, pose: lbs::pose },
+    SkinningMethod { number: 1, name: "dqs", label: "Dual Quaternion", centers: false, pose: dqs::pose },
+    SkinningMethod { number: 2, name: "cor", label: "Centers of Rotation", centers: true, pose: cor::pose },
 ];
 
 /// The method called `name`.

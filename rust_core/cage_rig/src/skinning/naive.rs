@@ -3,11 +3,25 @@
 use crate::points::{Matrix3, Point, Transform};
 use crate::rows::Rows;
 
-/// M′ from T, Ω (`#M by #J`, rows that sum to 1 or 0) and M.
-pub(crate) type Oracle = fn(&[Transform], &Rows, &[Point]) -> Vec<Point>;
+/// M′ from T, Ω (`#M by #J`, rows that sum to 1 or 0), M and p.
+pub(crate) type Oracle = fn(&[Transform], &Rows, &[Point], &[Point]) -> Vec<Point>;
 
 /// The oracle of each method in `METHODS`.
-pub(crate) const ORACLES: &[(&str, Oracle)] = &[("lbs", lbs), ("dqs", dqs)];
+pub(crate) const ORACLES: &[(&str, Oracle)] = &[
+    ("lbs", |transforms, weights, rest, _| lbs(transforms, weights, rest)),
+    ("dqs", |transforms, weights, rest, _| dqs(transforms, weights, rest)),
+    ("cor", cor),
+];
+
+/// Ω as the oracles want it: dense, every row sums to 1 or 0.
+pub(crate) fn normalised(weights: &Rows) -> Rows {
+    let mut dense = weights.clone();
+    for i in 0..dense.len() {
+        let sum: f64 = dense.row(i).iter().sum();
+        dense.row_mut(i).iter_mut().filter(|_| sum > 0.0).for_each(|w| *w /= sum);
+    }
+    dense
+}
 
 /// [CTL*20] Eq. (3): v′ = Σ_j ω_ij (R_j v + t_j); a row of zeros leaves its vertex alone.
 pub(crate) fn lbs(transforms: &[Transform], weights: &Rows, rest: &[Point]) -> Vec<Point> {
@@ -51,6 +65,62 @@ pub(crate) fn dqs(transforms: &[Transform], weights: &Rows, rest: &[Point]) -> V
         });
     }
     posed
+}
+
+/// Eq. (5–6): R(i) turns about p_i, which bones move linearly; before it the scales of T_j = R_j S_j
+/// blend linearly about p_i.
+pub(crate) fn cor(transforms: &[Transform], weights: &Rows, rest: &[Point], centers: &[Point]) -> Vec<Point> {
+    let turns: Vec<Matrix3> = transforms.iter().map(|t| polar(&t.linear)).collect();
+    let real: Vec<Quaternion> = turns.iter().map(quaternion).collect();
+    let mut posed = Vec::new();
+    for (i, (v, p)) in rest.iter().zip(centers).enumerate() {
+        let signs = signs(weights.row(i), &real);
+        let (mut q, mut stretch, mut carried) = ([0.0; 4], Matrix3::zeros(), Point::zeros());
+        for (j, t) in transforms.iter().enumerate() {
+            let weight = weights.row(i)[j];
+            (0..4).for_each(|k| q[k] += weight * signs[j] * real[j][k]);
+            stretch += weight * turns[j].transpose() * t.linear;
+            carried += weight * (t.linear * p + t.translation);
+        }
+        let size: f64 = q.iter().map(|x| x * x).sum();
+        let d = stretch * (v - p);
+        let turned = times(times(q, [0.0, d.x, d.y, d.z]), [q[0], -q[1], -q[2], -q[3]]);
+        posed.push(if size == 0.0 { *v } else { carried + Point::from_fn(|k, _| turned[k + 1] / size) });
+    }
+    posed
+}
+
+/// [LH16]: p_i = Σ_x s(ω_i, ω_x) a_x x / Σ_x s(ω_i, ω_x) a_x over triangles x with area a_x, mean
+/// weights ω_x and mean position x; with Σ s a_x |x − p_i|², the spread of what moves alike.
+pub(crate) fn center(
+    skin: &[Point],
+    triangles: &[[u32; 3]],
+    weights: &Rows,
+    vertex: usize,
+    sigma: f64,
+) -> Option<(Point, f64)> {
+    let own = weights.row(vertex);
+    let (mut total, mut first, mut second) = (0.0, Point::zeros(), 0.0);
+    for corners in triangles {
+        let [a, b, c] = corners.map(|v| skin[v as usize]);
+        let area = (b - a).cross(&(c - a)).norm() / 2.0;
+        let middle = (a + b + c) / 3.0;
+        let mean: Vec<f64> = (0..own.len())
+            .map(|j| corners.iter().map(|&v| weights.row(v as usize)[j]).sum::<f64>() / 3.0)
+            .collect();
+        let joints: Vec<usize> = (0..own.len()).filter(|&j| own[j] * mean[j] > 0.0).collect();
+        for (n, &j) in joints.iter().enumerate() {
+            for &k in &joints[n + 1..] {
+                let apart = (own[j] * mean[k] - own[k] * mean[j]) / sigma;
+                let share = own[j] * own[k] * mean[j] * mean[k] * (-apart * apart).exp() * area;
+                total += share;
+                first += share * middle;
+                second += share * middle.norm_squared();
+            }
+        }
+    }
+    let p = first / total;
+    (total > 0.0).then(|| (p, (second / total - p.norm_squared()).max(0.0).sqrt()))
 }
 
 /// w, x, y, z.

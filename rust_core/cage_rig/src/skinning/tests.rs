@@ -15,11 +15,26 @@ fn weights(fixture: &Fixture) -> SkinWeights {
     SkinWeights::from_dense(&fixture.weights).expect("valid weights")
 }
 
+/// Any centers will do: what methods promise does not depend on them.
+fn centers(fixture: &Fixture) -> Vec<Point> {
+    fixtures::nudged(&fixture.skin, 0.1 * fixture.size(), 11)
+}
+
 fn posed(method: &SkinningMethod, fixture: &Fixture, transforms: &[Transform]) -> Vec<[f32; 3]> {
-    let packed = PackedWeights::new(&weights(fixture));
-    let rest = to_f32(&fixture.skin);
+    posed_about(method, fixture, transforms, &centers(fixture))
+}
+
+fn posed_about(
+    method: &SkinningMethod,
+    fixture: &Fixture,
+    transforms: &[Transform],
+    centers: &[Point],
+) -> Vec<[f32; 3]> {
+    let weights = PackedWeights::new(&weights(fixture));
+    let (rest, centers) = (to_f32(&fixture.skin), to_f32(centers));
     let mut out = vec![[f32::NAN; 3]; rest.len()];
-    (method.pose)(&SkinningInput { transforms, weights: &packed, rest_skin: &rest }, &mut out);
+    let input = SkinningInput { transforms, weights: &weights, rest_skin: &rest, centers: &centers };
+    (method.pose)(&input, &mut out);
     out
 }
 
@@ -36,7 +51,7 @@ fn rigs() -> Vec<Fixture> {
 /// Frame against oracle, relative to the size of the posed skin.
 fn frame_error(method: &SkinningMethod, fixture: &Fixture, transforms: &[Transform]) -> f64 {
     let oracle = ORACLES.iter().find(|(name, _)| *name == method.name).expect("every method has an oracle").1;
-    let expected = oracle(transforms, &normalised(fixture), &fixture.skin);
+    let expected = oracle(transforms, &normalised(fixture), &fixture.skin, &centers(fixture));
     let frame = fixtures::points(&posed(method, fixture, transforms));
     fixtures::distance(&frame, &expected) / fixture.size().max(crate::bounding_diagonal(&expected))
 }
@@ -47,14 +62,8 @@ fn mirror() -> Transform {
     Transform { linear, translation: Point::new(0.4, 0.0, 0.0) }
 }
 
-/// Ω as the oracle wants it: dense, every row 1 or 0.
 fn normalised(fixture: &Fixture) -> Rows {
-    let mut dense = fixture.weights.clone();
-    for i in 0..dense.len() {
-        let sum: f64 = dense.row(i).iter().sum();
-        dense.row_mut(i).iter_mut().filter(|_| sum > 0.0).for_each(|w| *w /= sum);
-    }
-    dense
+    super::naive::normalised(&fixture.weights)
 }
 
 #[test]
@@ -166,7 +175,8 @@ fn moving_the_whole_scene_moves_the_result() {
                 Fixture { skin: fixture.skin.iter().map(|v| scene.apply(v)).collect(), ..fixture.clone() };
             let here = fixtures::points(&posed(method, &fixture, &pose));
             let expected: Vec<Point> = here.iter().map(|v| scene.apply(v)).collect();
-            let found = fixtures::points(&posed(method, &moved, &there));
+            let centers: Vec<Point> = centers(&fixture).iter().map(|p| scene.apply(p)).collect();
+            let found = fixtures::points(&posed_about(method, &moved, &there, &centers));
             let size = fixture.size().max(crate::bounding_diagonal(&expected));
             assert!(fixtures::distance(&found, &expected) <= 2.0 * FRAME * size, "{}", method.name);
         }
@@ -208,7 +218,7 @@ fn bones_turned_to_either_side_of_half_a_turn_meet_in_between() {
                 weights: Rows::from_vec(1, 2, vec![0.5, 0.5]).expect("one row"),
                 ..fixtures::shapes::bar()
             };
-            let found = fixtures::points(&posed(method, &fixture, &pose))[0];
+            let found = fixtures::points(&posed_about(method, &fixture, &pose, &[Point::zeros()]))[0];
             let turned = pose.map(|t| t.apply(&v));
             let between = (turned[0] + turned[1]).normalize();
             assert!((found - between).norm() < 1e-6, "{} {a} {b}: {found}", method.name);
@@ -248,12 +258,13 @@ fn what_the_weights_lack_to_one_stands_still() {
     }
     let packed = |rows: &Rows| PackedWeights::new(&SkinWeights::from_blended(rows));
     let still = [pose.clone(), vec![Transform::identity()]].concat();
-    let rest = to_f32(&fixture.skin);
+    let (rest, centers) = (to_f32(&fixture.skin), to_f32(&centers(&fixture)));
     for method in METHODS {
         let mut out = [rest.clone(), rest.clone()];
         for (out, (weights, transforms)) in out.iter_mut().zip([(&partial, &pose), (&complete, &still)]) {
             let weights = packed(weights);
-            (method.pose)(&SkinningInput { transforms, weights: &weights, rest_skin: &rest }, out);
+            let input = SkinningInput { transforms, weights: &weights, rest_skin: &rest, centers: &centers };
+            (method.pose)(&input, out);
         }
         let [a, b] = out.map(|out| fixtures::points(&out));
         assert!(fixtures::distance(&a, &b) <= FRAME * fixture.size(), "{}", method.name);
@@ -263,7 +274,7 @@ fn what_the_weights_lack_to_one_stands_still() {
 #[test]
 fn numbers_and_names_are_what_files_have() {
     let table: Vec<_> = METHODS.iter().map(|method| (method.number, method.name)).collect();
-    assert_eq!(table, [(0, "lbs"), (1, "dqs")]);
+    assert_eq!(table, [(0, "lbs"), (1, "dqs"), (2, "cor")]);
 }
 
 #[test]
@@ -276,13 +287,14 @@ fn many_vertices_go_through_threads_to_the_same_result() {
     });
     let pose = fixtures::lively_pose(&fixture, 1.0);
     for method in METHODS {
-        let whole = posed(method, &fixture, &pose);
+        let centers = centers(&fixture);
+        let whole = posed_about(method, &fixture, &pose, &centers);
         let part = Fixture {
             skin: fixture.skin[15_000..].to_vec(),
             weights: fixture.weights.select(&(15_000..20_000).collect::<Vec<_>>()),
             ..fixture.clone()
         };
-        assert_eq!(posed(method, &part, &pose), whole[15_000..]);
+        assert_eq!(posed_about(method, &part, &pose, &centers[15_000..]), whole[15_000..]);
     }
 }
 
@@ -299,7 +311,7 @@ fn double_precision_blending_equals_the_oracle() {
 #[test]
 fn an_unknown_method_is_refused_with_the_known_ones() {
     let message = method("ragdoll").map(|_| ()).expect_err("there is none").to_string();
-    assert!(message.contains("ragdoll") && message.contains("lbs, dqs"), "{message}");
+    assert!(message.contains("ragdoll") && message.contains("lbs, dqs, cor"), "{message}");
 }
 
 #[test]
@@ -311,12 +323,13 @@ fn every_method_equals_the_reference_poses_of_the_arm() {
     let mut poses = arm::open("poses");
     let transforms = poses.poses("T_skin");
     assert_eq!(transforms.len(), 8);
+    let centers = arm::open("bind").rows("Lambda").times(&fixture.cage);
     for (method, (name, oracle)) in METHODS.iter().zip(ORACLES) {
         let reference = poses.point_lists(&format!("Mp_{name}"));
         for (pose, expected) in transforms.iter().zip(&reference) {
-            let exact = oracle(pose, &normalised(&fixture), &fixture.skin);
+            let exact = oracle(pose, &normalised(&fixture), &fixture.skin, &centers);
             assert!(fixtures::distance(&exact, expected) <= 1e-9);
-            let frame = fixtures::points(&posed(method, &fixture, pose));
+            let frame = fixtures::points(&posed_about(method, &fixture, pose, &centers));
             assert!(fixtures::distance(&frame, expected) <= FRAME * fixture.size());
         }
     }

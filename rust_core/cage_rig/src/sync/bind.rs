@@ -15,6 +15,7 @@ use crate::mesh::{triangulate, FaceFault, Polygons};
 use crate::points::{bounding_diagonal, first_not_finite, Point};
 use crate::rows::Rows;
 use crate::skeleton::Skeleton;
+use crate::skinning::centers::{centers, CenterOptions};
 use crate::skinning::{PackedWeights, SkinningMethod};
 use crate::weights::SkinWeights;
 use std::collections::HashSet;
@@ -51,7 +52,7 @@ pub struct Known {
     pub cage_coords: Option<Rows>,
     /// Ψ, `#J by #C`.
     pub joint_coords: Option<Rows>,
-    /// Λ, `#M by #C`: kept for methods that rotate about centers.
+    /// Λ, `#M by #C`: taken by methods that turn about centers, whichever is chosen first.
     pub center_coords: Option<Rows>,
 }
 
@@ -66,11 +67,18 @@ pub struct BindOptions {
     /// the biped) have no singular value below ten times the default; a biped cage inflated by 3 % of
     /// the height goes to 1e-4, and Eq. (8) throws it off by more than the height.
     pub min_singular: f64,
+    /// How centers of rotation are integrated, when a method needs them.
+    pub centers: CenterOptions,
 }
 
 impl Default for BindOptions {
     fn default() -> Self {
-        Self { maxvol: MaxVolOptions::default(), locality_exponent: 0.1, min_singular: 5e-3 }
+        Self {
+            maxvol: MaxVolOptions::default(),
+            locality_exponent: 0.1,
+            min_singular: 5e-3,
+            centers: CenterOptions::default(),
+        }
     }
 }
 
@@ -108,6 +116,8 @@ pub struct Binding {
     pub(super) anchors: Vec<usize>,
     pub(super) rest_skin: RestSkin,
     pub(super) packed_weights: PackedWeights,
+    skin_triangles: Vec<[u32; 3]>,
+    center_options: CenterOptions,
     pub(super) cage_updater: CageUpdater,
     pub(super) skeleton_updater: SkeletonUpdater,
     pub(super) report: Report,
@@ -166,6 +176,8 @@ impl Binding {
             anchors: chosen.rows,
             rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords),
             packed_weights: PackedWeights::new(&weights),
+            skin_triangles: triangles,
+            center_options: options.centers,
             cage_updater,
             skeleton_updater: SkeletonUpdater::new(skeleton, joint_coords),
             report,
@@ -173,6 +185,12 @@ impl Binding {
             cage_coords,
             cage,
         })
+    }
+
+    /// Λ = Φ_CoR Φ, `#M by #C`.
+    pub(super) fn integrate_centers(&self) -> Rows {
+        let (skin, weights) = (self.rest_skin.at_bind(), &self.packed_weights);
+        centers(skin, &self.skin_triangles, weights, &self.cage_coords, &self.center_options)
     }
 }
 
@@ -186,6 +204,9 @@ fn check_options(options: &BindOptions) -> Result<(), Error> {
     }
     if !(options.min_singular >= 0.0 && options.min_singular < 1.0) {
         return fail("min_singular", "at least 0 and below 1", options.min_singular);
+    }
+    if !(options.centers.sigma > 0.0 && options.centers.sigma.is_finite()) {
+        return fail("center_sigma", "above 0", options.centers.sigma);
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ pub mod cage_updater;
 pub mod joint_coordinates;
 pub mod max_entropy;
 pub mod maxvol;
+pub mod rest_centers;
 pub mod rest_skin;
 pub mod skeleton_updater;
 
@@ -34,6 +35,7 @@ use crate::points::{bounding_diagonal, first_not_finite, to_f32, Matrix3, Point,
 use crate::rows::Rows;
 use crate::skinning::{SkinningInput, SkinningMethod};
 use cage_reverser::CageReverser;
+use rest_centers::RestCenters;
 use skeleton_updater::JointMotion;
 
 /// A posed cage edit has arrived when it misses by this part of the size.
@@ -58,6 +60,10 @@ pub struct Work {
     pub skin_passes: usize,
     /// Evaluations of Eq. (8).
     pub cage_fits: usize,
+    /// Integrations of the centers of rotation.
+    pub center_integrations: usize,
+    /// Products with Λ over the whole skin.
+    pub center_passes: usize,
 }
 
 /// Which of the large arrays are due.
@@ -73,6 +79,7 @@ struct Stale {
 pub struct CoupledRig {
     binding: Binding,
     method: &'static SkinningMethod,
+    centers: Option<RestCenters>,
     rest_cage: Vec<Point>,
     motions: Vec<JointMotion>,
     offsets: Option<Vec<[f32; 3]>>,
@@ -90,10 +97,14 @@ impl CoupledRig {
     /// Binds: everything is precomputed here.
     pub fn new(input: BindInput) -> Result<Self, Error> {
         let method = input.method;
-        let binding = Binding::new(input)?;
+        let mut binding = Binding::new(input)?;
         let joints = binding.skeleton_updater.joints(binding.cage.vertices());
         let rest = binding.rest_skin.at_bind().to_vec();
-        Ok(Self {
+        let mut rig = Self {
+            centers: binding
+                .center_coords
+                .take()
+                .map(|coords| RestCenters::new(coords, binding.cage.vertices())),
             rest_cage: binding.cage.vertices().to_vec(),
             motions: vec![JointMotion { linear: Matrix3::identity(), step: Point::zeros() }; joints.len()],
             offsets: None,
@@ -107,7 +118,9 @@ impl CoupledRig {
             work: Work { anchor_factorisations: 1, ..Work::default() },
             method,
             binding,
-        })
+        };
+        rig.integrate_centers();
+        Ok(rig)
     }
 
     /// The bones move: `transforms` (one per joint) as the animation measures them at
@@ -174,11 +187,21 @@ impl CoupledRig {
     }
 
     /// How bones move the visible skin from now on. Nothing else depends on it: cages, joints and
-    /// transforms stay as they are.
+    /// transforms stay as they are. The first method with centers of rotation integrates them.
     pub fn set_method(&mut self, method: &'static SkinningMethod) {
         if method.number != self.method.number {
             self.method = method;
             self.stale.posed_skin = true;
+            self.integrate_centers();
+        }
+    }
+
+    /// Λ, once, when a method needs it and it was not given.
+    fn integrate_centers(&mut self) {
+        if self.method.centers && self.centers.is_none() {
+            let coords = self.binding.integrate_centers();
+            self.centers = Some(RestCenters::new(coords, self.binding.cage.vertices()));
+            self.work.center_integrations += 1;
         }
     }
 
@@ -199,6 +222,7 @@ impl CoupledRig {
             self.rest_cage.copy_from_slice(cage);
             self.joints = self.binding.skeleton_updater.joints(cage);
             self.stale.rest_skin = true;
+            self.centers.iter_mut().for_each(RestCenters::invalidate);
         }
         if let Some(motions) = motions {
             // Eq. (19) depends on the linear parts alone.
@@ -294,8 +318,13 @@ impl CoupledRig {
     pub fn posed_skin(&mut self) -> &[[f32; 3]] {
         self.rest_skin();
         if self.stale.posed_skin {
-            let weights = &self.binding.packed_weights;
-            let input = SkinningInput { transforms: &self.transforms, weights, rest_skin: &self.rest_skin };
+            let needed = self.centers.as_mut().filter(|_| self.method.centers);
+            let centers = needed.map_or(&[][..], |centers| {
+                self.work.center_passes += usize::from(centers.update(&self.rest_cage));
+                centers.centers()
+            });
+            let (transforms, weights) = (&self.transforms, &self.binding.packed_weights);
+            let input = SkinningInput { transforms, weights, rest_skin: &self.rest_skin, centers };
             (self.method.pose)(&input, &mut self.posed_skin);
             self.work.skin_passes += 1;
             self.stale.posed_skin = false;
@@ -343,9 +372,9 @@ impl CoupledRig {
         self.binding.skeleton_updater.joint_coords()
     }
 
-    /// Λ, `#M by #C`, where it is known.
+    /// Λ, `#M by #C`: given to the bind, or since a method first needed it.
     pub fn center_coords(&self) -> Option<&Rows> {
-        self.binding.center_coords.as_ref()
+        self.centers.as_ref().map(RestCenters::coords)
     }
 
     /// Anchor skin vertices, min(`#M`, `#C`).

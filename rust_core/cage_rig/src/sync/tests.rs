@@ -142,3 +142,23 @@ fn hierarchy_and_anchors_equal_the_reference_on_the_arm() {
     let shipped: Vec<usize> = arm::anchors().iter().map(|&i| i as usize).collect();
     assert!((ratio_of(&coords, &shipped) - 1.00014).abs() < 1e-4);
 }
+
+#[test]
+fn centers_of_rotation_move_with_the_cage() {
+    for fixture in fixtures::all() {
+        let method = crate::skinning::method("cor").expect("it is there");
+        let input = crate::sync::BindInput { method, ..fixture.input() };
+        let mut rig = crate::CoupledRig::new(input).expect("the fixture binds");
+        let cage = fixtures::nudged(&fixture.cage, 0.1, 4);
+        rig.play(&cage, &fixtures::lively_pose(&fixture, 0.8), None).expect("a valid frame");
+        let moved: Vec<Point> = cage.iter().zip(&fixture.cage).map(|(c, c0)| c - c0).collect();
+        let steps = rig.cage_coords().times(&moved);
+        let rest: Vec<Point> = fixture.skin.iter().zip(&steps).map(|(v, d)| v + d).collect();
+        // Eq. (14) as printed.
+        let centers = rig.center_coords().expect("the method needs them").times(&cage);
+        let weights = crate::skinning::naive::normalised(&fixture.weights);
+        let expected = crate::skinning::naive::cor(rig.transforms(), &weights, &rest, &centers);
+        let found = fixtures::points(rig.posed_skin());
+        assert!(fixtures::distance(&found, &expected) <= 4e-6 * fixture.size(), "{}", fixture.name);
+    }
+}

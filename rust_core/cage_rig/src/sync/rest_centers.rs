@@ -1,0 +1,50 @@
+//! Centers of rotation under an edited cage, for skinning methods that turn about them.
+//!
+//! [CTL*20] Eq. (14), p = Λ C. The same product as Eq. (7) with Λ for Φ, so in the same delta form:
+//! p = p₀ + Λ (C − C₀) with p₀ = Λ C₀, in single precision.
+
+use super::rest_skin::RestSkin;
+use crate::points::Point;
+use crate::rows::Rows;
+
+/// Λ and the centers of the present rest cage.
+#[derive(Debug, Clone)]
+pub struct RestCenters {
+    coords: Rows,
+    mover: RestSkin,
+    centers: Vec<[f32; 3]>,
+    stale: bool,
+}
+
+impl RestCenters {
+    /// Keeps `coords` (Λ, `#M by #C`) and `cage` (C₀, `#C by 3`).
+    pub fn new(coords: Rows, cage: &[Point]) -> Self {
+        let mover = RestSkin::new(&coords.times(cage), cage, &coords);
+        Self { coords, centers: mover.at_bind().to_vec(), mover, stale: true }
+    }
+
+    /// Λ.
+    pub fn coords(&self) -> &Rows {
+        &self.coords
+    }
+
+    /// The rest cage has changed.
+    pub fn invalidate(&mut self) {
+        self.stale = true;
+    }
+
+    /// Makes the centers those of `cage` (C, `#C by 3`); true if that was work.
+    pub fn update(&mut self, cage: &[Point]) -> bool {
+        let work = self.stale;
+        if work {
+            self.mover.write(cage, None, &mut self.centers);
+            self.stale = false;
+        }
+        work
+    }
+
+    /// p, `#M by 3`, as of the last update.
+    pub fn centers(&self) -> &[[f32; 3]] {
+        &self.centers
+    }
+}
