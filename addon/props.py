@@ -25,6 +25,7 @@ OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 METHODS = [
     ("LBS", "Linear", "Linear blend skinning: what Blender's Armature modifier does by default", 0),
     ("DQS", "Dual Quaternion", "Keeps the volume of twisted and bent limbs, as the modifier's Preserve Volume", 1),
+    ("COR", "Centers of Rotation", "Turns every vertex about a center of its own: no bulge at bends", 2),
 ]
 STATES = [
     ("NONE", "Not Bound", "This object is not the cage of a rig", 0),

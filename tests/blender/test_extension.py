@@ -37,5 +37,5 @@ def test_operators_and_panel_are_registered() -> None:
 def test_method_numbers_never_move() -> None:
     import bl_ext.user_default.cage_rig.props as props
 
-    assert {item[0]: item[3] for item in props.METHODS} == {"LBS": 0, "DQS": 1}
+    assert {item[0]: item[3] for item in props.METHODS} == {"LBS": 0, "DQS": 1, "COR": 2}
     assert {item[0]: item[3] for item in props.STATES} == {"NONE": 0, "LIVE": 1, "PAUSED": 2}

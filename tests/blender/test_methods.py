@@ -70,7 +70,7 @@ def test_a_skin_with_preserve_volume_is_bound_with_dqs() -> None:
     assert np.abs(shown(rig.skin) - native(rig.skin)).max() < 1e-5 * rig.size
 
 
-@pytest.mark.parametrize("method", ["LBS", "DQS"])
+@pytest.mark.parametrize("method", ["LBS", "DQS", "COR"])
 def test_the_posed_cage_lands_on_a_right_angle_elbow(bar: Rig, method: str) -> None:
     use(bar, method)
     bend(bar, np.pi / 2)
@@ -89,3 +89,18 @@ def test_the_posed_cage_does_not_depend_on_the_method(bar: Rig) -> None:
     posed = rest(bar.posed)
     use(bar, "DQS")
     assert np.array_equal(rest(bar.posed), posed)
+
+
+def test_cor_keeps_the_volume_of_a_bend_without_a_bulge(bar: Rig) -> None:
+    """At a right angle linear skinning pinches the elbow and DQS bulges; centers of rotation do neither."""
+    bend(bar, np.pi / 2)
+    reach = {}
+    for method in ("LBS", "DQS", "COR"):
+        use(bar, method)
+        near = np.abs(rest(bar.skin)[:, 0]) < 0.02
+        reach[method] = float(np.linalg.norm(shown(bar.skin)[near][:, :2], axis=1).max())
+    assert reach["LBS"] < reach["COR"] < reach["DQS"] * 1.2
+    assert np.abs(fresh(bar)[0] - shown(bar.skin)).max() < 1e-6
+    fat_key(bar, value=0.7)
+    assert np.isfinite(shown(bar.skin)).all()
+    assert bar.settings.state == "LIVE"
