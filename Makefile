@@ -31,6 +31,7 @@ lint: $(VENV)/.core
 
 bench: $(VENV)/.extension
 	$(PY) tools/with_extension.py tests/bench/bench_blender.py
+	cargo bench --quiet -p cage_rig --bench skinning
 
 fixtures: $(VENV)/.blender
 	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).parent.parent / "blender"), str(Path(__file__).parent.parent.parent)]
-from scene import bind, drag, enter_edit_mode, leave_edit_mode, rest, select, shown, update
+from scene import bind, drag, enter_edit_mode, leave_edit_mode, select, shown, update
 
 from blend_fixtures.bar import bar
 from blend_fixtures.build import RigObjects, build_biped, build_character
@@ -119,11 +119,10 @@ def posed_drag() -> list[Row]:
     rig = bind(build_biped())
     bpy.context.scene.frame_set(12)
     enter_edit_mode(rig.posed)
-    before = rest(rig.cage)
+    before = shown(rig.cage).copy()
     time_taken = median(lambda: drag(rig.posed, 40, (0.0005, 0.0, 0.0)))
     leave_edit_mode()
-    keys = rig.cage.data.shape_keys
-    assert np.abs(rest(rig.cage) - before).max() > 1e-4 or keys is not None
+    assert np.abs(shown(rig.cage) - before).max() > 1e-4, "the rest cage follows the drag"
     return [Row("drag of the posed cage, per mouse move: biped", time_taken, None, "nothing")]
 
 
