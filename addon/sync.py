@@ -122,6 +122,11 @@ def refit_joints(cage: bpy.types.Object) -> Matrix:
     return _running[cage.session_uid].session.joints
 
 
+def session_of(cage: bpy.types.Object) -> Session:
+    """The session of a live rig as of its last update, for bakes to read from and not to edit."""
+    return _running[cage.session_uid].session
+
+
 def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
     """Sync one rig. Never raises: a rig that can't run is paused and says why."""
     global _busy
