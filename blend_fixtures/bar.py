@@ -32,9 +32,14 @@ def bar(*, segments: int = 72, across: int = 12) -> Character:
 
 def joint_weights(x: Array) -> Array:
     """Weights of the two bones by a smooth step around x = 0 (#V by 2)."""
-    t = np.clip(0.5 + 0.5 * x / _BLEND, 0.0, 1.0)
-    second = t * t * t * (t * (6.0 * t - 15.0) + 10.0)
+    second = smooth_step(x, _BLEND)
     return np.column_stack([1.0 - second, second])
+
+
+def smooth_step(x: Array, half: float) -> Array:
+    """From 0 at −`half` to 1 at `half`, twice differentiable."""
+    t = np.clip(0.5 + 0.5 * x / half, 0.0, 1.0)
+    return t * t * t * (t * (6.0 * t - 15.0) + 10.0)
 
 
 def stretched_cage(cage: Cage, factor: float = STRETCH) -> Array:
@@ -48,13 +53,16 @@ def stretched_cage(cage: Cage, factor: float = STRETCH) -> Array:
 def box_cage(rings: tuple[float, ...] | list[float], *, half: float) -> Cage:
     """A box along x: four corners a ring at the given x (metres), `half` its half width."""
     corners = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
-    vertices = np.array([(x, *corner) for x in rings for corner in corners])
+    return Cage(np.array([(x, *corner) for x in rings for corner in corners]), ring_faces(len(rings)))
+
+
+def ring_faces(count: int) -> list[list[int]]:
+    """Quads over `count` rings of four corners along x, both ends closed, outward."""
     faces = [[0, 3, 2, 1]]
-    for k in range(len(rings) - 1):
-        low = 4 * k
+    for low in range(0, 4 * (count - 1), 4):
         faces += [[low + i, low + (i + 1) % 4, low + 4 + (i + 1) % 4, low + 4 + i] for i in range(4)]
-    last = 4 * (len(rings) - 1)
-    return Cage(vertices, [*faces, [last, last + 1, last + 2, last + 3]])
+    last = 4 * (count - 1)
+    return [*faces, [last, last + 1, last + 2, last + 3]]
 
 
 def _rounded_box(segments: int, across: int) -> tuple[Array, Array]:

@@ -34,7 +34,7 @@ def body_parts() -> list[Part]:
     """Head with face, and hands."""
     hand = _part(
         "hand.L",
-        _hand(),
+        hand_field(),
         (0.42, -0.15, 0.62),
         (0.75, 0.10, 0.94),
         cell=0.0090,
@@ -200,7 +200,8 @@ def _head() -> Field:
     return mirrored(union([union([skull, jaw], 0.10), neck, ear, nose], 0.022))
 
 
-def _hand() -> Field:
+def hand_field() -> Field:
+    """The left hand, from the wrist."""
     frame = np.stack([HAND_ALONG, HAND_FRONT, HAND_BACK])
     middle = hand_point(0.058, 0.0)
     box = ellipsoid((0.0, 0.0, 0.0), (0.062, 0.062, 0.034))

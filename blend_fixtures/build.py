@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from .arm import arm
 from .bar import bar
 from .biped import biped
 from .materials import material
@@ -41,6 +42,11 @@ def build_biped(*, walk: bool = True) -> RigObjects:
 def build_bar() -> RigObjects:
     """The bar of [CTL*20] Figure 5 with its cage."""
     return build_character(bar())
+
+
+def build_arm() -> RigObjects:
+    """The arm of [CTL*20] Figure 2 with its cage."""
+    return build_character(arm())
 
 
 def build_character(character: Character) -> RigObjects:

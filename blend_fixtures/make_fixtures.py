@@ -21,6 +21,7 @@ from blend_fixtures import build, rigs, small
 FIXTURES: dict[str, Callable[[], build.RigObjects]] = {
     "biped": build.build_biped,
     "bar": build.build_bar,
+    "arm": build.build_arm,
     "simple_bar": lambda: build.build_character(small.simple_bar()),
     "two_skins": lambda: build.build_character(small.two_skins()),
     "two_roots": lambda: build.build_character(small.two_roots()),
