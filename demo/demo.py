@@ -1,4 +1,5 @@
-"""Runs the main job of Cage Rig on a character and shows it: a .blend with the rig live, a picture, a baked Alembic.
+"""Runs the main job of Cage Rig on a character and shows it: a .blend with the rig live, a picture, a baked Alembic;
+and a picture of the skinning methods on an arm.
 
 python tools/with_extension.py demo/demo.py --out DIR [--quick] [--rig FILE] [--cage FILE]
 """
@@ -14,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from showcase import acting, coupling, figures, load_rig, picture
+from showcase import acting, coupling, figures, load_rig, methods, methods_picture, picture
 from showcase.bars import bar_figures, bound_bar
 from showcase.stages import Stages
 
@@ -46,14 +47,18 @@ def main() -> None:
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / "demo.blend"), compress=True)
     with stages.stage("picture"):
         picture.draw_picture(folder / "demo.png", states, bars, quick=args.quick, yaw=VIEW)
+    written = ["demo.png", "demo.blend", "demo.abc"]
+    if not args.rig:
+        _methods(stages, folder / "methods.png", quick=args.quick)
+        written.insert(1, "methods.png")
     stages.total()
-    print(f"see {folder / 'demo.png'}, {folder / 'demo.blend'}, {folder / 'demo.abc'}")
+    print("see", ", ".join(str(folder / name) for name in written))
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, required=True, help="folder for demo.blend, demo.png and demo.abc")
-    parser.add_argument("--quick", action="store_true", help="a smaller, coarser picture")
+    parser.add_argument("--out", type=Path, required=True, help="folder for what is written")
+    parser.add_argument("--quick", action="store_true", help="smaller, coarser pictures")
     parser.add_argument("--rig", type=Path, help="a rigged .glb, .gltf, .fbx or .blend, or a rig of text files (.skt)")
     parser.add_argument("--cage", type=Path, help="a cage as .obj, .ply or .glb; without it a coarse hull is made")
     return parser.parse_args()
@@ -130,6 +135,19 @@ def _bend(stages: Stages, bar: RigObjects | None) -> list[figures.Figure]:
         return []
     with stages.stage("bend the bar"):
         return bar_figures(bar)
+
+
+def _methods(stages: Stages, path: Path, *, quick: bool) -> None:
+    """The arm under each skinning method, as a picture of its own."""
+    with stages.stage("build and bind the arm"):
+        rig = methods.bound_arm()
+    rows = []
+    for identifier, name in coupling.methods(rig):
+        with stages.stage(f"arm, {name}") as notes:
+            rows.append(methods.method_row(rig, identifier, name))
+            notes.extend(rows[-1].elbow.facts())
+    with stages.stage("picture of the methods"):
+        methods_picture.draw_methods(path, rows, quick=quick)
 
 
 def _summary(rig: RigObjects) -> str:

@@ -58,14 +58,20 @@ def animate_key(rig: RigObjects, name: str, values: dict[int, float]) -> None:
         block.keyframe_insert("value", frame=frame)
 
 
-def animate_bend(rig: RigObjects, bone_name: str, angles: dict[int, float]) -> None:
-    """Keyframe a bar's bend: frame → degrees, upward."""
+def turn_up(rig: RigObjects, bone_name: str, degrees: float) -> None:
+    """Turn a bone that lies along x upward, about its parent."""
     bone = rig.armature.pose.bones[bone_name]
     bone.rotation_mode = "AXIS_ANGLE"
     axis = bone.bone.matrix_local.to_3x3().inverted() @ Vector((0.0, 1.0, 0.0))
+    bone.rotation_axis_angle = (-np.radians(degrees), *axis)
+    bpy.context.view_layer.update()
+
+
+def animate_bend(rig: RigObjects, bone_name: str, angles: dict[int, float]) -> None:
+    """Keyframe a bar's bend: frame → degrees, upward."""
     for frame, angle in angles.items():
-        bone.rotation_axis_angle = (-np.radians(angle), *axis)
-        bone.keyframe_insert("rotation_axis_angle", frame=frame)
+        turn_up(rig, bone_name, angle)
+        rig.armature.pose.bones[bone_name].keyframe_insert("rotation_axis_angle", frame=frame)
 
 
 def play(first: int, last: int) -> float:

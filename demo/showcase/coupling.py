@@ -35,6 +35,18 @@ def refit_armature(rig: RigObjects) -> bpy.types.Object:
     return rig.cage.cage_rig.refit_armature
 
 
+def methods(rig: RigObjects) -> list[tuple[str, str]]:
+    """Identifier and name of each skinning method, in the panel's order."""
+    items = rig.cage.cage_rig.bl_rna.properties["method"].enum_items
+    return [(item.identifier, item.name) for item in items]
+
+
+def use_method(rig: RigObjects, identifier: str) -> None:
+    """Choose the skinning method; the skins follow in the same update."""
+    rig.cage.cage_rig.method = identifier
+    bpy.context.view_layer.update()
+
+
 def is_available() -> bool:
     """Whether the add-on is enabled in this Blender."""
     return hasattr(bpy.types.Object, "cage_rig")
