@@ -37,3 +37,24 @@ def action_curves(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     strips = [strip for layer in data.action.layers for strip in layer.strips]
     bags = [strip.channelbag(slot) for strip in strips] if slot is not None else []
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
+
+
+def new_action(owner: bpy.types.ID, name: str) -> Any:
+    """Give `owner` a new, empty action; returns where its curves are made: `.fcurves.new(path, index=k)`.
+
+    That is the action itself up to 4.3, and the channelbag of a slot of its own from 4.4 on.
+    """
+    data = owner.animation_data_create()
+    action = bpy.data.actions.new(name)
+    data.action = action
+    if not hasattr(action, "slots"):
+        return action
+    slot = action.slots.new(owner.id_type, owner.name)
+    data.action_slot = slot
+    return action.layers.new("Layer").strips.new(type="KEYFRAME").channelbag(slot, ensure=True)
+
+
+def call(operator: Any, **options: Any) -> set[str]:
+    """Call an operator with those of the options that this Blender's version of it has."""
+    known = operator.get_rna_type().properties
+    return operator(**{name: value for name, value in options.items() if name in known})

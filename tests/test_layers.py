@@ -24,14 +24,18 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "sync": ({"bpy", "numpy"}, {"adapters", "health", "registry", "session", "skins"}),
     "lifecycle": ({"bpy", "numpy"}, {"adapters", "health", "props", "session", "sync"}),
+    "bake": (
+        {"bpy", "mathutils", "numpy", "pathlib", "struct"},
+        {"adapters", "bake", "compat", "health", "skins", "sync"},
+    ),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),
-    "operators": ({"bpy"}, {"lifecycle", "operators", "props", "selection"}),
+    "operators": ({"bpy"}, {"bake", "lifecycle", "operators", "props", "selection"}),
     "ui": ({"bpy"}, {"props", "ui"}),
     "__init__": (set(), {"handlers", "operators", "props", "ui"}),
 }
 STANDARD = {"__future__", "atexit", "collections", "contextlib", "dataclasses", "enum", "functools", "itertools"}
-STANDARD |= {"textwrap", "typing", "uuid"}
+STANDARD |= {"math", "textwrap", "typing", "uuid"}
 
 
 def layer_of(path: Path) -> str:

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from .. import compat
 
 Matrices = NDArray[np.float64]
+HELPER = "cage_rig_helper"  # marks bones that `add_helpers` made
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,20 @@ def read_pose_matrices(armature_object: bpy.types.Object) -> Matrices:
     return _read_matrices(armature_object.pose.bones, "matrix")
 
 
+def read_channels(armature_object: bpy.types.Object) -> Matrices:
+    """Location, rotation (a quaternion) and scale of every pose bone, `#bones by 10`. Pass the evaluated object."""
+    return np.array([[*bone.location, *_rotation(bone), *bone.scale] for bone in armature_object.pose.bones])
+
+
+def _rotation(bone: bpy.types.PoseBone) -> Quaternion:
+    if bone.rotation_mode == "QUATERNION":
+        return bone.rotation_quaternion.normalized()
+    if bone.rotation_mode == "AXIS_ANGLE":
+        angle, *axis = bone.rotation_axis_angle
+        return Quaternion(axis, angle) if any(axis) else Quaternion()
+    return bone.rotation_euler.to_quaternion()
+
+
 def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> Matrices:
     flat = np.empty(len(bones) * 16, np.float32)
     bones.foreach_get(name, flat)
@@ -103,11 +118,11 @@ def editing(obj: bpy.types.Object, context: bpy.types.Context) -> Iterator[bpy.t
         bpy.ops.object.mode_set(mode="OBJECT")
         obj.hide_set(eye)
         obj.hide_viewport = hidden
-        if not linked:
-            root.objects.unlink(obj)
         for other in selected:
             other.select_set(True)
         view_layer.objects.active = active
+        if not linked:
+            root.objects.unlink(obj)
 
 
 def free_bones(obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -168,6 +183,40 @@ def move_heads(obj: bpy.types.Object, context: bpy.types.Context, heads: dict[st
             bone.roll = roll
         for name in connected:
             bones[name].use_connect = True
+
+
+def disconnect(obj: bpy.types.Object, context: bpy.types.Context, names: list[str]) -> None:
+    """Let these bones leave their parent's tail; they stay where they are. Object Mode."""
+    connected = [name for name in names if obj.data.bones[name].use_connect]
+    if connected:
+        with editing(obj, context) as bones:
+            for name in connected:
+                bones[name].use_connect = False
+
+
+def add_helpers(obj: bpy.types.Object, context: bpy.types.Context, names: list[str]) -> dict[str, str]:
+    """Put a bone that inherits neither turn nor scale between each of these bones and its parent. Object Mode.
+
+    It rests where the bone rests, moves no skin, and hands on everything. Returns the names by the bones'.
+    """
+    if not names:
+        return {}
+    made = {}
+    with editing(obj, context) as bones:
+        for name in names:
+            bone, helper = bones[name], bones.new(f"{name}.shear")
+            made[name] = helper.name
+            helper[HELPER] = True
+            helper.head, helper.tail, helper.roll = bone.head, bone.tail, bone.roll
+            helper.use_deform = helper.use_inherit_rotation = False
+            helper.inherit_scale = "NONE"
+            helper.parent, bone.use_connect = bone.parent, False
+            bone.parent = helper
+            bone.use_inherit_rotation = bone.use_local_location = True
+            bone.inherit_scale = "FULL"
+            for collection in bone.collections:
+                collection.assign(helper)
+    return made
 
 
 def depend_on_bones(obj: bpy.types.Object, armature_object: bpy.types.Object, names: list[str]) -> None:

@@ -35,6 +35,20 @@ def read_weights(obj: bpy.types.Object, bone_index: dict[str, int]) -> Csr:
     return indptr, joints, values
 
 
+def write_weights(obj: bpy.types.Object, names: list[str], weights: Csr) -> None:
+    """Add groups of CSR weights, whose columns are `names` and whose rows are normalised. Not in Edit Mode.
+
+    A name without weights gets no group. Walks the weights, as Blender has no bulk access.
+    """
+    indptr, columns, values = weights
+    row = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
+    shares = values / np.bincount(row, values, minlength=len(indptr) - 1)[row]
+    for column in np.unique(columns).tolist():
+        add, at = obj.vertex_groups.new(name=names[column]).add, columns == column
+        for vertex, share in zip(row[at].tolist(), shares[at].tolist(), strict=True):
+            add((vertex,), share, "REPLACE")
+
+
 def read_group(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
     """Weights of one vertex group, `#V`; zero where a vertex is not in it or the group is gone."""
     weights = np.zeros(len(obj.data.vertices), np.float32)

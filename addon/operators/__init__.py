@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from .apply_refit import CAGE_RIG_OT_apply_refit
+from .bake import CAGE_RIG_OT_bake
 from .bind import CAGE_RIG_OT_bind
 from .rebind import CAGE_RIG_OT_rebind
 from .select_part import CAGE_RIG_OT_select_part
@@ -16,6 +17,7 @@ CLASSES = (
     CAGE_RIG_OT_rebind,
     CAGE_RIG_OT_unbind,
     CAGE_RIG_OT_apply_refit,
+    CAGE_RIG_OT_bake,
     CAGE_RIG_OT_select_part,
 )
 
