@@ -55,6 +55,7 @@ class Options(TypedDict, total=False):
     max_anchor_swaps: int
     locality_exponent: float
     min_singular: float
+    falloff: float  # outside the cage its effect ends after so many mean cage edges
     center_sigma: float
     center_bins: int  # 0: exact, slow
 
@@ -63,6 +64,8 @@ class Report(TypedDict):
     joints_outside_hull: list[int]
     unweighted_joints: list[int]
     unweighted_vertices: int
+    vertices_outside: int
+    vertices_out_of_reach: int
     anchor_max_ratio: float
     anchor_swaps: int
     anchor_condition: float
@@ -114,6 +117,12 @@ class CoupledRig:
         rest_joints: ArrayLike | None = None,
     ) -> None: ...
     def offset_rest_skin(self, offsets: ArrayLike | None) -> None: ...
+    def mask_skin(self, mask: ArrayLike | None) -> None: ...  # (#M,), 0 to 1: where the cage acts
+    def carry(
+        self,
+        cage: ArrayLike | None,  # (#C, 3), with joints or not at all
+        joints: ArrayLike | None,  # (#J, 3)
+    ) -> None: ...  # what a lower cage has moved this rig's rest cage and joints by
     def set_method(self, name: str) -> None: ...  # at any time; changes the posed skin alone
     @property
     def method(self) -> str: ...

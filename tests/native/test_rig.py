@@ -241,3 +241,48 @@ def test_a_cage_can_be_checked_alone(bar):
     assert found["turned"] is False and found["triangles"].shape == (28, 3)
     triangles = found["triangles"][:, ::-1]
     assert core.check_cage(bar["cage_vertices"], triangles)["turned"] is True
+
+
+def test_a_mask_confines_the_cage_and_none_frees_it(bar):
+    rig = core.CoupledRig(**bar)
+    assert rig.report["vertices_outside"] == 0
+    fat = bar["cage_vertices"] * [1, 1.5, 1.5]
+    rig.edit_rest_cage(fat)
+    whole = rig.rest_skin
+    mask = np.clip(bar["skin_vertices"][:, 0] / 10, 0, 1)
+    rig.mask_skin(mask.astype(np.float32))
+    wanted = bar["skin_vertices"] + (whole - bar["skin_vertices"]) * mask[:, None]
+    np.testing.assert_allclose(rig.rest_skin, wanted, atol=1e-6)
+    with pytest.raises(core.SkinError, match="entry 3 of the mask"):
+        rig.mask_skin(np.where(np.arange(len(mask)) == 3, 1.5, mask))
+    with pytest.raises(core.ArrayError, match="mask"):
+        rig.mask_skin(mask[1:])
+    np.testing.assert_allclose(rig.rest_skin, wanted, atol=1e-6)
+    rig.mask_skin(None)
+    np.testing.assert_array_equal(rig.rest_skin, whole)
+
+
+def test_a_rig_is_carried_by_what_is_below(bar):
+    rig = core.CoupledRig(**bar)
+    up = np.array([0, 0, 2.0])
+    rig.carry(np.tile(up, (16, 1)), np.tile(up, (2, 1)))
+    np.testing.assert_allclose(rig.joints, bar["joints"] + up, atol=1e-12)
+    np.testing.assert_allclose(rig.posed_cage, bar["cage_vertices"] + up, atol=1e-12)
+    np.testing.assert_array_equal(rig.rest_cage, bar["cage_vertices"])
+    with pytest.raises(core.CageRigError, match="together"):
+        rig.carry(None, np.tile(up, (2, 1)))
+    rig.carry(None, None)
+    np.testing.assert_allclose(rig.posed_cage, bar["cage_vertices"], atol=1e-12)
+
+
+def test_a_cage_of_a_part_says_what_it_leaves_out(bar, square_tube):
+    cage, faces = square_tube([(6.0, 0.9), (8.0, 1.1), (10.5, 0.9)])
+    rig = core.CoupledRig(**{**bar, "cage_vertices": cage, "cage_faces": faces})
+    outside = (bar["skin_vertices"][:, 0] < 6.0).sum()
+    assert rig.report["vertices_outside"] == outside
+    near = core.CoupledRig(**{**bar, "cage_vertices": cage, "cage_faces": faces}, options={"falloff": 0.1})
+    assert rig.report["vertices_out_of_reach"] < near.report["vertices_out_of_reach"] <= outside
+    with pytest.raises(core.SkinError, match="encloses no vertex"):
+        core.CoupledRig(**{**bar, "cage_vertices": cage + np.array([0, 99, 0]), "cage_faces": faces})
+    with pytest.raises(core.CageRigError, match="falloff"):
+        core.CoupledRig(**bar, options={"falloff": 0.0})

@@ -115,6 +115,12 @@ pub enum SkinError {
     OffsetCount { expected: usize, found: usize },
     #[error("row {row} of the offsets of the rest skin is not finite")]
     OffsetNotFinite { row: usize },
+    #[error("the cage encloses no vertex of the skin; the cage and the skin must be at the same place")]
+    OutOfReach,
+    #[error("the mask of the skin has {found} entries; the skin has {expected} vertices")]
+    MaskCount { expected: usize, found: usize },
+    #[error("entry {row} of the mask of the skin is {found}; a mask is from 0 to 1")]
+    MaskRange { row: usize, found: f32 },
     #[error("anchor {vertex} is not a skin vertex (there are {vertices})")]
     BadAnchor { vertex: i64, vertices: usize },
     #[error("anchor {vertex} is listed twice")]

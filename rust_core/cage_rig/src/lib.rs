@@ -16,6 +16,7 @@
 mod cage;
 pub mod coordinates;
 mod error;
+mod geometry;
 mod linalg;
 mod mesh;
 mod points;

@@ -105,6 +105,15 @@ fn integer_block(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyRe
     Ok(Block { data, shape: array.shape().to_vec() })
 }
 
+/// One number for each of `rows`, in the frame's single precision.
+pub(crate) fn singles(
+    value: &Bound<'_, PyAny>,
+    argument: &str,
+    rows: (&str, Option<usize>),
+) -> PyResult<Vec<f32>> {
+    Ok(floats(value, argument, &[rows])?.data.into_iter().map(|x| x as f32).collect())
+}
+
 /// Points, `n by 3`; `rows` is what the first length is called.
 pub(crate) fn points(
     value: &Bound<'_, PyAny>,

@@ -3,7 +3,7 @@
 
 use crate::arrays::{self, Out};
 use crate::errors::{CageRigError, OrRaise};
-use cage_rig::sync::{BindInput, BindOptions, Known};
+use cage_rig::sync::{BindInput, BindOptions, Carried, Known};
 use cage_rig::{Cage, Point, Skeleton};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -143,6 +143,33 @@ impl CoupledRig {
         self.with(py, |rig| rig.offset_rest_skin(offsets.as_deref()))?.or_raise()
     }
 
+    /// Confines the cage to mask (#M,), 0 to 1, or not at all (None).
+    #[pyo3(signature = (mask))]
+    fn mask_skin(&self, py: Python<'_>, mask: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let rows = ("#M", Some(self.skin_vertices));
+        let mask = mask.map(|mask| arrays::singles(mask, "mask", rows)).transpose()?;
+        self.with(py, |rig| rig.mask_skin(mask.as_deref()))?.or_raise()
+    }
+
+    /// Stands the rig on what a lower cage has done to its cage (#C, 3) and joints (#J, 3).
+    #[pyo3(signature = (cage, joints))]
+    fn carry(
+        &self,
+        py: Python<'_>,
+        cage: Option<&Bound<'_, PyAny>>,
+        joints: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let cage = cage.map(|cage| self.cage(cage)).transpose()?;
+        let joints =
+            joints.map(|joints| arrays::points(joints, "joints", ("#J", Some(self.joints)))).transpose()?;
+        let carried = match (cage, joints) {
+            (Some(cage), Some(joints)) => Some(Carried { cage, joints }),
+            (None, None) => None,
+            _ => return Err(CageRigError::new_err("carry takes cage and joints together, or neither")),
+        };
+        self.with(py, |rig| rig.carry(carried))?.or_raise()
+    }
+
     /// Changes how the bones move the visible skin; nothing else depends on it.
     fn set_method(&self, py: Python<'_>, name: &str) -> PyResult<()> {
         let method = cage_rig::skinning::method(name).or_raise()?;
@@ -274,6 +301,8 @@ impl CoupledRig {
         report.set_item("joints_outside_hull", found.joints_outside_hull)?;
         report.set_item("unweighted_joints", found.unweighted_joints)?;
         report.set_item("unweighted_vertices", found.unweighted_vertices)?;
+        report.set_item("vertices_outside", found.vertices_outside)?;
+        report.set_item("vertices_out_of_reach", found.vertices_out_of_reach)?;
         report.set_item("anchor_max_ratio", found.anchor_max_ratio)?;
         report.set_item("anchor_swaps", found.anchor_swaps)?;
         report.set_item("anchor_condition", found.anchor_condition)?;
@@ -319,11 +348,12 @@ fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOptions> {
             "max_anchor_swaps" => options.maxvol.max_swaps = value.extract()?,
             "locality_exponent" => options.locality_exponent = value.extract()?,
             "min_singular" => options.min_singular = value.extract()?,
+            "falloff" => options.falloff = value.extract()?,
             "center_sigma" => options.centers.sigma = value.extract()?,
             "center_bins" => options.centers.bins = value.extract()?,
             unknown => {
                 return Err(CageRigError::new_err(format!(
-                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular, center_sigma, center_bins"
+                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular, falloff, center_sigma, center_bins"
                 )))
             }
         }

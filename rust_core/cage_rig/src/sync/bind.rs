@@ -6,6 +6,8 @@
 use super::cage_updater::CageUpdater;
 use super::joint_coordinates::{joint_coordinates, SkinAtRest};
 use super::maxvol::{maxvol, ratio_of, MaxVol, MaxVolOptions};
+use super::reach::reach;
+use super::rest_centers::RestCenters;
 use super::rest_skin::RestSkin;
 use super::skeleton_updater::SkeletonUpdater;
 use crate::cage::Cage;
@@ -69,6 +71,8 @@ pub struct BindOptions {
     pub min_singular: f64,
     /// How centers of rotation are integrated, when a method needs them.
     pub centers: CenterOptions,
+    /// Outside the cage its effect falls to nothing over this many mean cage edges.
+    pub falloff: f64,
 }
 
 impl Default for BindOptions {
@@ -78,6 +82,7 @@ impl Default for BindOptions {
             locality_exponent: 0.1,
             min_singular: 5e-3,
             centers: CenterOptions::default(),
+            falloff: 1.0,
         }
     }
 }
@@ -93,6 +98,10 @@ pub struct Report {
     pub unweighted_joints: Vec<usize>,
     /// Skin vertices without weights, not moved by the skeleton.
     pub unweighted_vertices: usize,
+    /// Skin vertices outside the cage, which it moves less.
+    pub vertices_outside: usize,
+    /// Those of them that are too far outside to be moved by it at all.
+    pub vertices_out_of_reach: usize,
     /// max |Φ Φ̃⁻¹|.
     pub anchor_max_ratio: f64,
     /// Swaps MaxVol made.
@@ -113,6 +122,8 @@ pub struct Binding {
     pub(super) cage: Cage,
     pub(super) cage_coords: Rows,
     pub(super) center_coords: Option<Rows>,
+    /// How much of the cage's movement each vertex takes part in; none: all of it.
+    pub(super) reach: Option<Vec<f32>>,
     pub(super) anchors: Vec<usize>,
     pub(super) rest_skin: RestSkin,
     pub(super) packed_weights: PackedWeights,
@@ -137,42 +148,47 @@ impl Binding {
             Some(coords) => coords,
             None => (input.coordinates.compute)(&cage, &skin),
         };
+        let reach = reach(&cage, &skin, options.falloff);
+        if reach.iter().all(|part| *part == 0.0) {
+            return Err(SkinError::OutOfReach.into());
+        }
         let chosen = match known.anchors {
             Some(anchors) => given_anchors(&anchors, &cage_coords)?,
-            None => maxvol(&cage_coords, &options.maxvol),
+            None => choose_anchors(&cage_coords, &reach, &options.maxvol),
         };
         let mut report = Report {
             cage_turned: cage.turned(),
             unweighted_vertices: (0..rows).filter(|&i| weights.row(i).is_empty()).count(),
+            vertices_outside: reach.iter().filter(|part| **part < 1.0).count(),
+            vertices_out_of_reach: reach.iter().filter(|part| **part == 0.0).count(),
             anchor_max_ratio: chosen.ratio,
             anchor_swaps: chosen.swaps,
             coordinate_error_max: largest_miss(&cage_coords, cage.vertices(), &skin),
             ..Report::default()
         };
+        let at_rest = SkinAtRest {
+            vertices: &skin,
+            triangles: &triangles,
+            weights: &weights,
+            cage_coords: &cage_coords,
+            reach: &reach,
+        };
         let joint_coords = match checked(known.joint_coords, "joint_coords", joints, columns)? {
             Some(coords) => coords,
             None => {
-                let (vertices, triangles, weights, cage_coords) = (&skin, &triangles, &weights, &cage_coords);
-                let skin = SkinAtRest { vertices, triangles, weights, cage_coords };
-                let found = joint_coordinates(&cage, &skin, skeleton.joints(), options.locality_exponent);
+                let found = joint_coordinates(&cage, &at_rest, skeleton.joints(), options.locality_exponent);
                 report.joints_outside_hull = found.outside_hull;
                 report.unweighted_joints = found.without_locality;
                 found.coords
             }
         };
         report.joint_error_max = largest_miss(&joint_coords, cage.vertices(), skeleton.joints());
-        let cage_updater = CageUpdater::new(
-            &chosen.rows,
-            &cage_coords,
-            &skin,
-            &weights,
-            cage.vertices(),
-            options.min_singular,
-        );
+        let cage_updater = CageUpdater::new(&chosen.rows, &at_rest, cage.vertices(), options.min_singular);
         report.anchor_condition = cage_updater.condition();
         report.regularised = cage_updater.attenuated();
         Ok(Self {
             center_coords: checked(known.center_coords, "center_coords", rows, columns)?,
+            reach: (report.vertices_outside > 0).then(|| reach.iter().map(|part| *part as f32).collect()),
             anchors: chosen.rows,
             rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords),
             packed_weights: PackedWeights::new(&weights),
@@ -187,10 +203,34 @@ impl Binding {
         })
     }
 
-    /// Λ = Φ_CoR Φ, `#M by #C`.
-    pub(super) fn integrate_centers(&self) -> Rows {
+    /// Centers of rotation under Λ = Φ_CoR Φ, `#M by #C`.
+    pub(super) fn integrate_centers(&self) -> RestCenters {
         let (skin, weights) = (self.rest_skin.at_bind(), &self.packed_weights);
-        centers(skin, &self.skin_triangles, weights, &self.cage_coords, &self.center_options)
+        let integrate =
+            |values: &Rows| centers(skin, &self.skin_triangles, weights, values, &self.center_options);
+        let Some(reach) = &self.reach else {
+            return self.given_centers(integrate(&self.cage_coords));
+        };
+        // What the cage does not reach stays: Φ_CoR (reach Φ), and p₀ = Φ_CoR M₀ beside it.
+        let columns = self.cage_coords.columns();
+        let mut values = Rows::zeros(skin.len(), columns + 3);
+        for (i, part) in reach.iter().enumerate() {
+            let (coords, place) = values.row_mut(i).split_at_mut(columns);
+            coords.iter_mut().zip(self.cage_coords.row(i)).for_each(|(x, phi)| *x = phi * f64::from(*part));
+            place.iter_mut().zip(skin[i]).for_each(|(x, v)| *x = v.into());
+        }
+        let found = integrate(&values);
+        let at_bind: Vec<Point> =
+            (0..skin.len()).map(|i| Point::from_row_slice(&found.row(i)[columns..])).collect();
+        let mut coords = Rows::zeros(skin.len(), columns);
+        (0..skin.len()).for_each(|i| coords.row_mut(i).copy_from_slice(&found.row(i)[..columns]));
+        RestCenters::new(coords, &at_bind, self.cage.vertices())
+    }
+
+    /// Centers of rotation p₀ = Λ C₀ under a given Λ (`coords`, `#M by #C`).
+    pub(super) fn given_centers(&self, coords: Rows) -> RestCenters {
+        let cage = self.cage.vertices();
+        RestCenters::new(coords.clone(), &coords.times(cage), cage)
     }
 }
 
@@ -204,6 +244,9 @@ fn check_options(options: &BindOptions) -> Result<(), Error> {
     }
     if !(options.min_singular >= 0.0 && options.min_singular < 1.0) {
         return fail("min_singular", "at least 0 and below 1", options.min_singular);
+    }
+    if !(options.falloff > 0.0 && options.falloff.is_finite()) {
+        return fail("falloff", "above 0", options.falloff);
     }
     if !(options.centers.sigma > 0.0 && options.centers.sigma.is_finite()) {
         return fail("center_sigma", "above 0", options.centers.sigma);
@@ -251,6 +294,23 @@ fn checked(
         Some(row) => Err(Error::NotFinite { argument, row }),
         None => Ok(Some(given)),
     }
+}
+
+/// Anchors among the skin that the cage moves wholly, or mostly where that is too little: far outside,
+/// coordinates are large and would be chosen first.
+fn choose_anchors(cage_coords: &Rows, reach: &[f64], options: &MaxVolOptions) -> MaxVol {
+    for least in [1.0, 0.5, f64::MIN_POSITIVE] {
+        let within: Vec<usize> = (0..reach.len()).filter(|&i| reach[i] >= least).collect();
+        if within.len() == reach.len() {
+            break;
+        }
+        if within.len() >= cage_coords.columns() {
+            let mut chosen = maxvol(&cage_coords.select(&within), options);
+            chosen.rows.iter_mut().for_each(|row| *row = within[*row]);
+            return chosen;
+        }
+    }
+    maxvol(cage_coords, options)
 }
 
 fn given_anchors(anchors: &[i64], cage_coords: &Rows) -> Result<MaxVol, Error> {

@@ -29,13 +29,15 @@ pub struct CageReverser {
 }
 
 impl CageReverser {
-    /// Assembles and factors Eq. (19) for `linear` (R_j, one per joint).
+    /// Assembles and factors Eq. (19) for `linear` (R_j, one per joint). Joint j takes part in the
+    /// cage's movement by `shares[j]`.
     pub fn new(
         cage: &CageUpdater,
         skeleton: &SkeletonUpdater,
         linear: &[Matrix3],
+        shares: &[f64],
     ) -> Result<Self, PoseError> {
-        let gradient = skeleton.translation_gradient(linear);
+        let gradient = skeleton.translation_gradient(linear, shares);
         let mut at_anchors = weighted_gradient(cage.anchor_weights(), &gradient);
         let coords = cage.anchor_coords();
         for (i, turn) in cage.anchor_linear(linear).iter().enumerate() {

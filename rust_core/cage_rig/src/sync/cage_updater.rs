@@ -9,6 +9,7 @@
 //! to it, C_s: C′ = C_s + V f(Σ) Uᵀ (M̃′ − Φ̃ C_s), with f(σ) = 1/σ from τ on and σ/τ² below.
 //! Where nothing is below τ this is Eq. (8). All in displacements from rest, exact at rest.
 
+use super::joint_coordinates::SkinAtRest;
 use crate::linalg::{product, svd, Lu};
 use crate::points::{Matrix3, Point, Transform};
 use crate::rows::Rows;
@@ -46,22 +47,14 @@ pub(super) enum Side<'a> {
 }
 
 impl CageUpdater {
-    /// Factors Φ̃. `anchors` are rows of `cage_coords` (Φ, `#M by #C`), `skin` is M₀, `weights` Ω,
-    /// `cage` C₀; `min_singular` is τ relative to the largest singular value.
-    pub fn new(
-        anchors: &[usize],
-        cage_coords: &Rows,
-        skin: &[Point],
-        weights: &SkinWeights,
-        cage: &[Point],
-        min_singular: f64,
-    ) -> Self {
-        let anchor_coords = cage_coords.select(anchors);
-        let (fit, condition) = fit(&anchor_coords, min_singular, || cage_skin_weights(cage_coords, weights));
+    /// Factors Φ̃. `anchors` are vertices of `skin`, `cage` is C₀; `min_singular` is τ relative to the largest singular value.
+    pub fn new(anchors: &[usize], skin: &SkinAtRest, cage: &[Point], min_singular: f64) -> Self {
+        let anchor_coords = skin.cage_coords.select(anchors);
+        let (fit, condition) = fit(&anchor_coords, min_singular, || cage_skin_weights(skin));
         Self {
             anchor_coords,
-            anchor_rest: anchors.iter().map(|&i| skin[i]).collect(),
-            anchor_weights: weights.select(anchors),
+            anchor_rest: anchors.iter().map(|&i| skin.vertices[i]).collect(),
+            anchor_weights: skin.weights.select(anchors),
             cage: cage.to_vec(),
             fit,
             condition,
@@ -164,16 +157,18 @@ fn transposed(matrix: &Rows) -> Rows {
     out
 }
 
-/// The skin weights carried over to the cage: w_k = Σ_i φ_ik² ω_i / Σ_i φ_ik². A cage vertex that
-/// touches no skin vertex at all gets no weights and stands still.
-pub fn cage_skin_weights(cage_coords: &Rows, weights: &SkinWeights) -> SkinWeights {
+/// The skin weights carried over to the cage: w_k = Σ_i φ_ik² ω_i / Σ_i φ_ik² over the skin that it
+/// reaches. A cage vertex that touches no skin vertex at all gets no weights and stands still.
+pub fn cage_skin_weights(skin: &SkinAtRest) -> SkinWeights {
+    let SkinAtRest { cage_coords, weights, reach, .. } = skin;
     let mut sums = Rows::zeros(cage_coords.columns(), weights.joints());
     let mut totals = vec![0.0; cage_coords.columns()];
     for i in 0..cage_coords.len() {
         for (k, phi) in cage_coords.row(i).iter().enumerate() {
-            totals[k] += phi * phi;
+            let share = phi * phi * reach[i];
+            totals[k] += share;
             for &(joint, weight) in weights.row(i) {
-                sums.row_mut(k)[joint as usize] += phi * phi * weight;
+                sums.row_mut(k)[joint as usize] += share * weight;
             }
         }
     }

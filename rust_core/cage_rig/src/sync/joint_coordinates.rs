@@ -36,6 +36,8 @@ pub struct SkinAtRest<'a> {
     pub weights: &'a SkinWeights,
     /// Φ, `#M by #C`.
     pub cage_coords: &'a Rows,
+    /// How much of the cage's movement each vertex takes part in, `#M`.
+    pub reach: &'a [f64],
 }
 
 /// Ψ of `joints` (`#J by 3`). `exponent` is s of Eq. (9).
@@ -91,7 +93,7 @@ fn masses(
     }
     let mut masses = vec![0.0; skin.cage_coords.columns()];
     for (vertex, locality) in locality {
-        let factor = shares[vertex] * locality;
+        let factor = shares[vertex] * locality * skin.reach[vertex];
         masses.iter_mut().zip(skin.cage_coords.row(vertex)).for_each(|(m, phi)| *m += factor * phi);
     }
     masses.iter().any(|m| m.is_finite() && *m > 0.0).then_some(masses)

@@ -15,12 +15,15 @@
 pub mod bind;
 pub mod cage_reverser;
 pub mod cage_updater;
+mod ground;
 pub mod joint_coordinates;
 pub mod max_entropy;
 pub mod maxvol;
+pub mod reach;
 pub mod rest_centers;
 pub mod rest_skin;
 pub mod skeleton_updater;
+mod work;
 
 #[cfg(test)]
 mod naive;
@@ -28,15 +31,19 @@ mod naive;
 mod tests;
 
 pub use bind::{BindInput, BindOptions, Binding, Known, Report};
+pub use ground::Carried;
+pub use work::Work;
 
 use crate::cage::Cage;
 use crate::error::{Error, PoseError, SkinError};
-use crate::points::{bounding_diagonal, first_not_finite, to_f32, Matrix3, Point, Transform};
+use crate::points::{bounding_diagonal, first_not_finite, Matrix3, Point, Transform};
 use crate::rows::Rows;
 use crate::skinning::{SkinningInput, SkinningMethod};
 use cage_reverser::CageReverser;
+use ground::Ground;
 use rest_centers::RestCenters;
 use skeleton_updater::JointMotion;
+use work::Stale;
 
 /// A posed cage edit has arrived when it misses by this part of the size.
 const ARRIVED: f64 = 1e-12;
@@ -44,35 +51,6 @@ const ARRIVED: f64 = 1e-12;
 const REACHED: f64 = 1e-10;
 /// Solves an edit may take: one, and refinements where Eq. (19) is badly conditioned.
 const SOLVES: usize = 4;
-
-/// How often something expensive was done since the bind.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Work {
-    /// Factorisations of Φ̃ (one, at bind).
-    pub anchor_factorisations: usize,
-    /// Factorisations of Eq. (19).
-    pub reverse_factorisations: usize,
-    /// Solves with them.
-    pub reverse_solves: usize,
-    /// Products with Φ over the whole skin.
-    pub rest_passes: usize,
-    /// Skinnings of the whole skin.
-    pub skin_passes: usize,
-    /// Evaluations of Eq. (8).
-    pub cage_fits: usize,
-    /// Integrations of the centers of rotation.
-    pub center_integrations: usize,
-    /// Products with Λ over the whole skin.
-    pub center_passes: usize,
-}
-
-/// Which of the large arrays are due.
-#[derive(Debug, Clone, Copy)]
-struct Stale {
-    rest_skin: bool,
-    posed_skin: bool,
-    posed_cage: bool,
-}
 
 /// A character bound to a cage and a skeleton. Rig space throughout.
 #[derive(Debug, Clone)]
@@ -82,7 +60,7 @@ pub struct CoupledRig {
     centers: Option<RestCenters>,
     rest_cage: Vec<Point>,
     motions: Vec<JointMotion>,
-    offsets: Option<Vec<[f32; 3]>>,
+    ground: Ground,
     joints: Vec<Point>,
     transforms: Vec<Transform>,
     rest_skin: Vec<[f32; 3]>,
@@ -98,22 +76,20 @@ impl CoupledRig {
     pub fn new(input: BindInput) -> Result<Self, Error> {
         let method = input.method;
         let mut binding = Binding::new(input)?;
-        let joints = binding.skeleton_updater.joints(binding.cage.vertices());
+        let ground = Ground::new(&binding);
+        let joints = ground.joints(&binding, binding.cage.vertices());
         let rest = binding.rest_skin.at_bind().to_vec();
         let mut rig = Self {
-            centers: binding
-                .center_coords
-                .take()
-                .map(|coords| RestCenters::new(coords, binding.cage.vertices())),
+            centers: binding.center_coords.take().map(|coords| binding.given_centers(coords)),
             rest_cage: binding.cage.vertices().to_vec(),
             motions: vec![JointMotion { linear: Matrix3::identity(), step: Point::zeros() }; joints.len()],
-            offsets: None,
+            ground,
             transforms: vec![Transform::identity(); joints.len()],
             joints,
             posed_skin: rest.clone(),
             rest_skin: rest,
             posed_cage: binding.cage.vertices().to_vec(),
-            stale: Stale { rest_skin: false, posed_skin: false, posed_cage: false },
+            stale: Stale::default(),
             reverser: None,
             work: Work { anchor_factorisations: 1, ..Work::default() },
             method,
@@ -177,11 +153,41 @@ impl CoupledRig {
                 return Err(SkinError::OffsetNotFinite { row });
             }
         }
-        let offsets = offsets.filter(|o| o.iter().any(|p| *p != Point::zeros())).map(to_f32);
-        if offsets != self.offsets {
-            self.offsets = offsets;
-            self.stale.rest_skin = true;
-            self.stale.posed_skin = true;
+        if self.ground.set_offsets(offsets) {
+            self.rest_skin_changed();
+        }
+        Ok(())
+    }
+
+    /// Confines the cage to `mask` (`#M`, 0 to 1; none: wherever it reaches): a vertex, and a joint
+    /// by the skin around it, takes part in the cage's movement by so much. The posed cage stays the
+    /// whole one.
+    pub fn mask_skin(&mut self, mask: Option<&[f32]>) -> Result<(), SkinError> {
+        if let Some(mask) = mask {
+            if mask.len() != self.rest_skin.len() {
+                return Err(SkinError::MaskCount { expected: self.rest_skin.len(), found: mask.len() });
+            }
+            if let Some(row) = mask.iter().position(|part| !(0.0..=1.0).contains(part)) {
+                return Err(SkinError::MaskRange { row, found: mask[row] });
+            }
+        }
+        if self.ground.set_mask(&self.binding, mask) {
+            self.reverser = None;
+            self.rest_skin_changed();
+            self.refit();
+        }
+        Ok(())
+    }
+
+    /// Stands the rig on what a lower cage on the same character has done to its rest cage and
+    /// joints (none: nothing). What it does to the skin is among [`Self::offset_rest_skin`].
+    pub fn carry(&mut self, carried: Option<Carried>) -> Result<(), PoseError> {
+        if let Some(Carried { cage, joints }) = &carried {
+            self.check_cage(cage)?;
+            self.check_joints(joints)?;
+        }
+        if self.ground.set_carried(carried) {
+            self.refit();
         }
         Ok(())
     }
@@ -199,8 +205,7 @@ impl CoupledRig {
     /// Λ, once, when a method needs it and it was not given.
     fn integrate_centers(&mut self) {
         if self.method.centers && self.centers.is_none() {
-            let coords = self.binding.integrate_centers();
-            self.centers = Some(RestCenters::new(coords, self.binding.cage.vertices()));
+            self.centers = Some(self.binding.integrate_centers());
             self.work.center_integrations += 1;
         }
     }
@@ -220,9 +225,7 @@ impl CoupledRig {
         }
         if let Some(cage) = cage {
             self.rest_cage.copy_from_slice(cage);
-            self.joints = self.binding.skeleton_updater.joints(cage);
-            self.stale.rest_skin = true;
-            self.centers.iter_mut().for_each(RestCenters::invalidate);
+            self.rest_skin_changed();
         }
         if let Some(motions) = motions {
             // Eq. (19) depends on the linear parts alone.
@@ -230,6 +233,18 @@ impl CoupledRig {
             self.reverser = self.reverser.take().filter(|_| !turned);
             self.motions = motions;
         }
+        self.refit();
+    }
+
+    fn rest_skin_changed(&mut self) {
+        self.stale.rest_skin = true;
+        self.stale.posed_skin = true;
+        self.centers.iter_mut().for_each(RestCenters::invalidate);
+    }
+
+    /// Joints and transforms anew, and all that is posed by them.
+    fn refit(&mut self) {
+        self.joints = self.ground.joints(&self.binding, &self.rest_cage);
         self.transforms = self.binding.skeleton_updater.transforms(&self.motions, &self.joints);
         self.stale.posed_skin = true;
         self.stale.posed_cage = true;
@@ -242,7 +257,8 @@ impl CoupledRig {
             None => {
                 self.work.reverse_factorisations += 1;
                 let linear: Vec<Matrix3> = self.motions.iter().map(|m| m.linear).collect();
-                CageReverser::new(&self.binding.cage_updater, &self.binding.skeleton_updater, &linear)?
+                let Binding { cage_updater, skeleton_updater, .. } = &self.binding;
+                CageReverser::new(cage_updater, skeleton_updater, &linear, self.ground.shares())?
             }
         };
         let mut cage = self.rest_cage.clone();
@@ -252,9 +268,9 @@ impl CoupledRig {
             let step: Vec<Point> = wanted.iter().zip(&reached).map(|(w, r)| w - r).collect();
             let change = reverser.solve(&step);
             let next: Vec<Point> = cage.iter().zip(&change).map(|(c, d)| c + d).collect();
-            let joints = self.binding.skeleton_updater.joints(&next);
+            let joints = self.ground.joints(&self.binding, &next);
             let transforms = self.binding.skeleton_updater.transforms(&self.motions, &joints);
-            let posed = self.binding.cage_updater.posed_cage(&next, &transforms);
+            let posed = self.binding.cage_updater.posed_cage(&self.ground.cage(&next), &transforms);
             self.work.reverse_solves += 1;
             self.work.cage_fits += 1;
             let next_miss =
@@ -282,6 +298,13 @@ impl CoupledRig {
         first_not_finite(cage).map_or(Ok(()), |vertex| Err(PoseError::CageNotFinite { vertex }))
     }
 
+    fn check_joints(&self, joints: &[Point]) -> Result<(), PoseError> {
+        if joints.len() != self.joints.len() {
+            return Err(PoseError::JointCount { expected: self.joints.len(), found: joints.len() });
+        }
+        first_not_finite(joints).map_or(Ok(()), |joint| Err(PoseError::JointNotFinite { joint }))
+    }
+
     fn read_motions(
         &self,
         transforms: &[Transform],
@@ -295,19 +318,15 @@ impl CoupledRig {
         if let Some(joint) = transforms.iter().position(|t| !t.is_finite()) {
             return Err(PoseError::TransformNotFinite { joint });
         }
-        if rest_joints.len() != skeleton.len() {
-            return Err(PoseError::JointCount { expected: skeleton.len(), found: rest_joints.len() });
-        }
-        if let Some(joint) = first_not_finite(rest_joints) {
-            return Err(PoseError::JointNotFinite { joint });
-        }
+        self.check_joints(rest_joints)?;
         Ok(self.binding.skeleton_updater.motions(transforms, rest_joints))
     }
 
     /// Rest skin M, `#M by 3`.
     pub fn rest_skin(&mut self) -> &[[f32; 3]] {
         if self.stale.rest_skin {
-            self.binding.rest_skin.write(&self.rest_cage, self.offsets.as_deref(), &mut self.rest_skin);
+            let (mask, offsets) = (self.ground.mask(), self.ground.offsets());
+            self.binding.rest_skin.write(&self.rest_cage, mask, offsets, &mut self.rest_skin);
             self.work.rest_passes += 1;
             self.stale.rest_skin = false;
         }
@@ -320,7 +339,8 @@ impl CoupledRig {
         if self.stale.posed_skin {
             let needed = self.centers.as_mut().filter(|_| self.method.centers);
             let centers = needed.map_or(&[][..], |centers| {
-                self.work.center_passes += usize::from(centers.update(&self.rest_cage));
+                let (mask, offsets) = (self.ground.mask(), self.ground.offsets());
+                self.work.center_passes += usize::from(centers.update(&self.rest_cage, mask, offsets));
                 centers.centers()
             });
             let (transforms, weights) = (&self.transforms, &self.binding.packed_weights);
@@ -335,7 +355,8 @@ impl CoupledRig {
     /// Posed cage C′, `#C by 3`.
     pub fn posed_cage(&mut self) -> &[Point] {
         if self.stale.posed_cage {
-            self.posed_cage = self.binding.cage_updater.posed_cage(&self.rest_cage, &self.transforms);
+            let cage = self.ground.cage(&self.rest_cage);
+            self.posed_cage = self.binding.cage_updater.posed_cage(&cage, &self.transforms);
             self.work.cage_fits += 1;
             self.stale.posed_cage = false;
         }

@@ -41,14 +41,22 @@ impl RestSkin {
         &self.skin
     }
 
-    /// Writes M for `cage` (C, `#C by 3`); `offsets` (`#M by 3`, or none) are added.
-    pub fn write(&self, cage: &[Point], offsets: Option<&[[f32; 3]]>, rest: &mut [[f32; 3]]) {
+    /// Writes M for `cage` (C, `#C by 3`), of whose movement every vertex takes part by `mask` (`#M`;
+    /// none: wholly); `offsets` (`#M by 3`, or none) are added.
+    pub fn write(
+        &self,
+        cage: &[Point],
+        mask: Option<&[f32]>,
+        offsets: Option<&[[f32; 3]]>,
+        rest: &mut [[f32; 3]],
+    ) {
         let moved: Vec<(usize, [f32; 3])> = (0..cage.len())
             .filter(|&k| cage[k] != self.cage[k])
             .map(|k| (k, (cage[k] - self.cage[k]).map(|x| x as f32).into()))
             .collect();
-        let panel =
-            |(index, out): (usize, &mut [[f32; 3]])| self.write_panel(index * PANEL, &moved, offsets, out);
+        let panel = |(index, out): (usize, &mut [[f32; 3]])| {
+            self.write_panel(index * PANEL, &moved, mask, offsets, out);
+        };
         if rest.len() < PARALLEL_FROM {
             rest.chunks_mut(PANEL).enumerate().for_each(panel);
         } else {
@@ -60,6 +68,7 @@ impl RestSkin {
         &self,
         first: usize,
         moved: &[(usize, [f32; 3])],
+        mask: Option<&[f32]>,
         offsets: Option<&[[f32; 3]]>,
         out: &mut [[f32; 3]],
     ) {
@@ -70,6 +79,13 @@ impl RestSkin {
                 x[i] += phi * dx;
                 y[i] += phi * dy;
                 z[i] += phi * dz;
+            }
+        }
+        if let Some(mask) = mask {
+            for (i, part) in mask[first..][..out.len()].iter().enumerate() {
+                x[i] *= part;
+                y[i] *= part;
+                z[i] *= part;
             }
         }
         for (i, out) in out.iter_mut().enumerate() {

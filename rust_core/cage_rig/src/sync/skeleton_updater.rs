@@ -43,9 +43,17 @@ impl SkeletonUpdater {
         &self.joint_coords
     }
 
-    /// Rest joints a = Ψ C of `cage` (C, `#C by 3`), Eq. (13).
-    pub fn joints(&self, cage: &[Point]) -> Vec<Point> {
-        self.joint_coords.times(cage)
+    /// Rest joints a = Ψ C of `cage` (C, `#C by 3`), Eq. (13), of whose movement joint j takes part by
+    /// `shares[j]`.
+    pub fn joints(&self, cage: &[Point], shares: &[f64]) -> Vec<Point> {
+        let bound = self.skeleton.joints();
+        let mut joints = self.joint_coords.times(cage);
+        for ((joint, bound), &share) in
+            joints.iter_mut().zip(bound).zip(shares).filter(|(_, share)| **share != 1.0)
+        {
+            *joint = bound + (*joint - bound) * share;
+        }
+        joints
     }
 
     /// Reads R_j and d_j from `transforms` measured at `rest_joints` (`#J by 3`).
@@ -73,8 +81,9 @@ impl SkeletonUpdater {
 
     /// ∂t_j/∂c_k for every cage vertex k, as 3 by 3 blocks, `#J by #C`: the rows of
     /// B_topo⁻¹ A_R Ψ, Eq. (18), walked down the hierarchy instead of inverted:
-    /// ∂t_j = ∂t_parent + (R_parent − R_j) ∂a_j, and for a root ∂t_j = (I − R_j) ∂a_j.
-    pub fn translation_gradient(&self, linear: &[Matrix3]) -> Vec<Vec<Matrix3>> {
+    /// ∂t_j = ∂t_parent + (R_parent − R_j) ∂a_j, and for a root ∂t_j = (I − R_j) ∂a_j. Joint j takes
+    /// part in the cage's movement by `shares[j]`.
+    pub fn translation_gradient(&self, linear: &[Matrix3], shares: &[f64]) -> Vec<Vec<Matrix3>> {
         let columns = self.joint_coords.columns();
         let mut gradient = vec![Vec::new(); linear.len()];
         for &j in self.skeleton.parents_first() {
@@ -83,7 +92,7 @@ impl SkeletonUpdater {
                 None => (vec![Matrix3::zeros(); columns], Matrix3::identity() - linear[j]),
             };
             let row = above.iter().zip(self.joint_coords.row(j));
-            gradient[j] = row.map(|(above, psi)| above + turn * *psi).collect();
+            gradient[j] = row.map(|(above, psi)| above + turn * (shares[j] * psi)).collect();
         }
         gradient
     }

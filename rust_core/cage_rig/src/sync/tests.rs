@@ -2,6 +2,7 @@
 
 use super::cage_reverser::CageReverser;
 use super::cage_updater::CageUpdater;
+use super::joint_coordinates::SkinAtRest;
 use super::maxvol::{maxvol, ratio_of, MaxVolOptions};
 use super::naive::{hierarchy, linear_parts, reverse_matrix, translation_gradient};
 use super::skeleton_updater::SkeletonUpdater;
@@ -22,13 +23,23 @@ fn skeleton(fixture: &Fixture) -> Skeleton {
     Skeleton::new(fixture.joints.clone(), &fixture.parents).expect("a valid skeleton")
 }
 
+fn at_rest<'a>(fixture: &'a Fixture, cage_coords: &'a Rows, weights: &'a SkinWeights) -> SkinAtRest<'a> {
+    let reach = &[1.0; 1000][..fixture.skin.len()];
+    SkinAtRest { vertices: &fixture.skin, triangles: &[], weights, cage_coords, reach }
+}
+
+fn whole(joints: usize) -> Vec<f64> {
+    vec![1.0; joints]
+}
+
 fn parts(fixture: &Fixture) -> (CageUpdater, SkeletonUpdater) {
     let cage = fixture.cage();
     let coords = coordinates(&cage, &fixture.skin);
     let anchors = maxvol(&coords, &MaxVolOptions::default()).rows;
     let weights = SkinWeights::from_dense(&fixture.weights).expect("valid weights");
     let joint_coords = fixture.rig().joint_coords().clone();
-    let cage_updater = CageUpdater::new(&anchors, &coords, &fixture.skin, &weights, cage.vertices(), 1e-3);
+    let cage_updater =
+        CageUpdater::new(&anchors, &at_rest(fixture, &coords, &weights), cage.vertices(), 1e-3);
     (cage_updater, SkeletonUpdater::new(skeleton(fixture), joint_coords))
 }
 
@@ -38,7 +49,7 @@ fn the_walk_down_the_hierarchy_equals_the_inverted_matrix() {
         let linear = linear_parts(&fixtures::lively_pose(&fixture, 1.0));
         let (_, updater) = parts(&fixture);
         let expected = translation_gradient(&skeleton(&fixture), &linear, updater.joint_coords());
-        for (j, row) in updater.translation_gradient(&linear).iter().enumerate() {
+        for (j, row) in updater.translation_gradient(&linear, &whole(linear.len())).iter().enumerate() {
             for (k, block) in row.iter().enumerate() {
                 for (d, e) in (0..9).map(|n| (n / 3, n % 3)) {
                     assert!((block[(d, e)] - expected.row(3 * j + d)[3 * k + e]).abs() < 1e-12);
@@ -58,7 +69,8 @@ fn the_reverser_solves_equation_19_as_printed() {
     let system = reverse_matrix(&cage, &gradient, &linear);
     let step = fixtures::nudged(&vec![Point::zeros(); fixture.cage.len()], 1.0, 5);
     let expected = Lu::new(&system).solve_interleaved(&cage.anchor_coords().times(&step));
-    let found = CageReverser::new(&cage, &updater, &linear).expect("a solvable pose").solve(&step);
+    let found = CageReverser::new(&cage, &updater, &linear, &whole(linear.len()));
+    let found = found.expect("a solvable pose").solve(&step);
     assert!(fixtures::distance(&found, &expected) < 1e-10);
 }
 
@@ -69,18 +81,14 @@ fn an_attenuated_fit_keeps_the_cage_near_the_skinned_one() {
     assert!(cage.attenuated() > 0);
     assert!(cage.condition() > 1e3);
     let pose = fixtures::lively_pose(&fixture, 0.5);
-    let joints = updater.joints(&fixture.cage);
+    let joints = updater.joints(&fixture.cage, &whole(fixture.joints.len()));
     let transforms = updater.transforms(&updater.motions(&pose, &joints), &joints);
     let posed = cage.posed_cage(&fixture.cage, &transforms);
     assert!(fixtures::distance(&posed, &fixture.cage) < 5.0 * cage_size(&fixture));
-    let exact = CageUpdater::new(
-        fixture.rig().anchors(),
-        fixture.rig().cage_coords(),
-        &fixture.skin,
-        &SkinWeights::from_dense(&fixture.weights).expect("valid weights"),
-        &fixture.cage,
-        0.0,
-    );
+    let rig = fixture.rig();
+    let weights = SkinWeights::from_dense(&fixture.weights).expect("valid weights");
+    let skin = at_rest(&fixture, rig.cage_coords(), &weights);
+    let exact = CageUpdater::new(rig.anchors(), &skin, &fixture.cage, 0.0);
     // Eq. (8) as printed throws the far rings away from the character.
     assert!(
         fixtures::distance(&exact.posed_cage(&fixture.cage, &transforms), &fixture.cage)
@@ -145,7 +153,8 @@ fn hierarchy_and_anchors_equal_the_reference_on_the_arm() {
 
 #[test]
 fn centers_of_rotation_move_with_the_cage() {
-    for fixture in fixtures::all() {
+    let caged = |fixture: &Fixture| fixture.rig().report().vertices_outside == 0;
+    for fixture in fixtures::all().into_iter().filter(caged) {
         let method = crate::skinning::method("cor").expect("it is there");
         let input = crate::sync::BindInput { method, ..fixture.input() };
         let mut rig = crate::CoupledRig::new(input).expect("the fixture binds");

@@ -53,7 +53,13 @@ impl Fixture {
 
 /// Every fixture of the project's own.
 pub fn all() -> Vec<Fixture> {
-    vec![shapes::bar(), shapes::blob(), shapes::more_cage_than_skin(), shapes::far_vertex()]
+    vec![
+        shapes::bar(),
+        shapes::blob(),
+        shapes::more_cage_than_skin(),
+        shapes::far_vertex(),
+        shapes::partly_caged(),
+    ]
 }
 
 /// Rotation about `axis` by `angle` that keeps `pivot` in place.

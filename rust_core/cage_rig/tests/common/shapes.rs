@@ -151,3 +151,9 @@ pub fn far_vertex() -> Fixture {
     ]);
     Fixture { name: "far vertex", cage, cage_faces, ..bar() }
 }
+
+/// The bar, of which a cage encloses the last third alone.
+pub fn partly_caged() -> Fixture {
+    let (cage, cage_faces) = square_tube(&[(5.6, 0.9), (6.8, 1.0), (8.3, 1.0), (10.5, 0.9)]);
+    Fixture { name: "partly caged", cage, cage_faces, ..bar() }
+}

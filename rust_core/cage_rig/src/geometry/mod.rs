@@ -1,0 +1,4 @@
+//! Geometry that knows nothing of cages or skeletons.
+
+pub mod distance;
+pub mod inside;
