@@ -9,7 +9,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from .adapters import armature, modifier, positions
+from . import layers, linked
+from .adapters import armature, modifier, positions, stack
 
 
 def problem(cage: bpy.types.Object) -> str:
@@ -20,7 +21,21 @@ def problem(cage: bpy.types.Object) -> str:
     posed = settings.posed_cage
     if posed is not None and posed.cage_rig.owner != cage:
         return f"'{cage.name}' is a copy of cage '{_name(posed.cage_rig.owner)}'; bind it to skins and bones of its own"
-    return _armature_problem(cage) or _cage_problem(cage) or _skins_problem(cage)
+    return (
+        linked.problem(cage)
+        or _armature_problem(cage)
+        or _cage_problem(cage)
+        or _skins_problem(cage)
+        or layers.problem(cage)
+        or _below_problem(cage)
+    )
+
+
+def _below_problem(cage: bpy.types.Object) -> str:
+    for lower in layers.below(cage):
+        if lower.cage_rig.state != "LIVE":
+            return f"'{cage.name}' stands on '{lower.name}', which is paused: {lower.cage_rig.message}"
+    return ""
 
 
 def live_skins(cage: bpy.types.Object) -> list[tuple[int, bpy.types.Object]]:
@@ -88,29 +103,24 @@ def _skins_problem(cage: bpy.types.Object) -> str:
         snapshot = cage.cage_rig.skins[index].snapshot
         if snapshot is None:
             return f"What was bound of '{obj.name}' is lost; press Rebind"
-        if obj.data.library is not None:
-            return (
-                f"The mesh of '{obj.name}' is linked from '{obj.data.library.name}', where Cage Rig can't write; "
-                "append the character, or make it local"
-            )
         if len(obj.data.vertices) != len(snapshot.vertices):
             return (
                 f"'{obj.name}' has {len(obj.data.vertices)} vertices, it had {len(snapshot.vertices)} "
                 "when it was bound; undo, or press Rebind"
             )
-        ours = modifier.find(obj)
-        if ours is None:
+        if modifier.find(obj, cage) is None:
             return f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind"
-        if modifier.input_object(ours, "Rest Cage") != cage:
-            return f"'{obj.name}' follows another cage; press Rebind to take it back"
-        blocking = modifier.blocking(obj, list(obj.modifiers).index(ours))
+        blocking = stack.blocking(obj, stack.first(obj))
         if blocking:
             return f"Modifier '{blocking}' of '{obj.name}' may change the vertices before Cage Rig; move it after"
-        reordering = modifier.reordering(obj)
+        mask = cage.cage_rig.skins[index].mask
+        if mask and mask not in obj.vertex_groups:
+            return f"Vertex group '{mask}', the mask of '{obj.name}', was deleted; choose another or none"
+        reordering = stack.reordering(obj)
         if reordering:
             return (
                 f"Modifier '{reordering}' of '{obj.name}' may reorder the vertices, so that what the modifiers before "
-                "Cage Rig do can't be read; switch one or the other off"
+                "Cage Rig do, or its mask, can't be read; switch one or the other off"
             )
     return ""
 

@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import health, props, sync
-from .adapters import armature, modifier, positions, shape_keys, snapshot, vertex_groups
+from . import health, layers, props, sync
+from .adapters import armature, modifier, positions, shape_keys, snapshot, stack, vertex_groups
 from .session import Session, SessionError, SkinSnapshot, Snapshot
 
 Matrix = NDArray[np.float64]
@@ -41,15 +41,18 @@ def bind(
 ) -> None:
     """Bind skins, armature and cage into a rig that is live from now on. Object Mode.
 
-    Raises `BindError`, with nothing changed, where that can't be.
+    Where another rig of this armature deforms one of the skins already, the new one stands on it. Raises `BindError`,
+    with nothing changed, where it can't be bound.
     """
-    for obj in (cage, *skins):
-        _refuse_taken(obj)
+    _refuse_cage(cage)
+    lower = _rig_below(armature_object, skins)
     bound = _read(context, cage, armature_object, skins)
     session = _compute(cage, bound)
     settings = cage.cage_rig
-    settings.version, settings.armature = props.VERSION, armature_object
-    if all(modifier.preserves_volume(obj, armature_object) for obj in skins):
+    settings.version, settings.armature, settings.input = props.VERSION, armature_object, lower
+    if lower is not None:
+        settings.method = lower.cage_rig.method
+    elif all(stack.preserves_volume(obj, armature_object) for obj in skins):
         settings.method = "DQS"
     for obj in skins:
         settings.skins.add().object = obj
@@ -66,6 +69,7 @@ def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> None:
     Skins that were deleted are forgotten. Raises `BindError`, with nothing changed, where it can't be.
     """
     settings = cage.cage_rig
+    _refuse_override(cage)
     if settings.armature is None or not settings.armature.users_collection:
         raise BindError(f"The armature of '{cage.name}' was deleted; undo, or Unbind and bind with another")
     if settings.posed_cage is not None and settings.posed_cage.cage_rig.owner != cage:
@@ -83,17 +87,23 @@ def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> None:
 
 
 def unbind(cage: bpy.types.Object) -> None:
-    """Put everything back as it was before the bind and forget the rig."""
+    """Put everything back as it was before the bind and forget the rig. What stood on it stands on what is below.
+
+    Raises `BindError`, with nothing changed, for a rig of another file.
+    """
     settings = cage.cage_rig
+    _refuse_override(cage)
     sync.drop(cage)
     owned = settings.posed_cage is None or settings.posed_cage.cage_rig.owner == cage
+    for upper in [obj for obj in bpy.data.objects if obj.cage_rig.input == cage]:
+        upper.cage_rig.input = settings.input
     for skin in settings.skins:
         if owned and skin.object is not None:
-            modifier.release(skin.object)
+            _leave(skin.object, cage)
         if owned:
             _remove_mesh(skin.snapshot)
     if owned:
-        modifier.restore_suspended(cage)
+        stack.restore_suspended(cage)
         _remove_mesh(settings.snapshot)
         for obj in (settings.posed_cage, settings.refit_armature):
             _remove_object(obj)
@@ -113,9 +123,13 @@ def apply_refit(context: bpy.types.Context, cage: bpy.types.Object) -> int:
         raise BindError(f"'{cage.name}' is not live: {settings.message}")
     if obj.library or obj.data.library or obj.override_library or obj.data.override_library:
         raise BindError(f"Armature '{obj.name}' is linked from another file, so its rest bones can't be moved")
-    if shape_keys.is_animated(cage):
+    upper = [other.name for other in bpy.data.objects if other.cage_rig.input == cage]
+    if upper:
+        raise BindError(f"'{upper[0]}' stands on '{cage.name}' and moves its joints on; apply the refit of that one")
+    animated = next((layer for layer in (cage, *layers.below(cage)) if shape_keys.is_animated(layer)), None)
+    if animated is not None:
         raise BindError(
-            f"The rest cage '{cage.name}' is animated, so its joints have no one place; "
+            f"The rest cage '{animated.name}' is animated, so its joints have no one place; "
             "remove its keys, drivers and modifiers, or apply them, and try again"
         )
     rest = armature.read_rest(obj.data)
@@ -134,8 +148,9 @@ def apply_refit(context: bpy.types.Context, cage: bpy.types.Object) -> int:
             "delete its location keys and try again"
         )
     armature.move_heads(obj, context, heads)
-    for joint in settings.joints:
-        joint.shift = heads[joint.name] - np.array(joint.head)
+    for layer in (cage, *layers.below(cage)):
+        for joint in layer.cage_rig.joints:
+            joint.shift = heads[joint.name] - np.array(joint.head)
     context.view_layer.update()
     return len(moved)
 
@@ -150,6 +165,11 @@ def summary(cage: bpy.types.Object) -> str:
         f"Bound '{cage.name}' ({len(settings.snapshot.vertices)} vertices) to {len(settings.skins)} skin(s) "
         f"({vertices} vertices) and {len(settings.joints)} bones"
     )
+    if settings.input is not None:
+        text += f", on top of '{settings.input.name}'"
+    missed = report.get("vertices_outside", 0)
+    if missed:
+        text += f". {missed} skin vertices are outside the cage, which moves them less the farther they are"
     outside = [settings.joints[k].name for k in report.get("joints_outside_hull", [])]
     if outside:
         named = ", ".join(f"'{name}'" for name in outside[:3]) + (" and others" if len(outside) > 3 else "")
@@ -157,7 +177,7 @@ def summary(cage: bpy.types.Object) -> str:
     return text
 
 
-def _refuse_taken(obj: bpy.types.Object) -> None:
+def _refuse_cage(obj: bpy.types.Object) -> None:
     settings = obj.cage_rig
     if settings.state != "NONE":
         owner = settings.posed_cage.cage_rig.owner if settings.posed_cage else obj
@@ -169,6 +189,42 @@ def _refuse_taken(obj: bpy.types.Object) -> None:
         raise BindError(f"'{obj.name}' belongs to the rig of cage '{settings.owner.name}'; Unbind that first")
     if obj.library is not None or obj.data.library is not None:
         raise BindError(f"'{obj.name}' is linked from another file; make it local first")
+
+
+def _rig_below(armature_object: bpy.types.Object, skins: list[bpy.types.Object]) -> bpy.types.Object | None:
+    """The rig that deforms skins of the selection already, on which a new one would stand."""
+    lower: bpy.types.Object | None = None
+    for obj in skins:
+        settings = obj.cage_rig
+        if obj.library is not None:
+            raise BindError(f"'{obj.name}' is linked from another file; make a library override or make it local")
+        if settings.state != "NONE":
+            raise BindError(f"'{obj.name}' is the cage of a rig; Unbind it first, or leave it out of the selection")
+        if settings.part == "NONE" or settings.owner is None:
+            continue
+        if settings.part != "SKIN" or settings.owner.cage_rig.armature != armature_object:
+            raise BindError(f"'{obj.name}' belongs to the rig of cage '{settings.owner.name}'; Unbind that first")
+        if lower not in (None, settings.owner):
+            raise BindError(
+                f"The skins belong to the rigs of '{lower.name}' and '{settings.owner.name}'; bind a cage to one only"
+            )
+        lower = settings.owner
+    return lower
+
+
+def _refuse_override(cage: bpy.types.Object) -> None:
+    if cage.library is not None or cage.override_library is not None:
+        raise BindError(f"'{cage.name}' was bound in another file; open that one to bind anew, or delete it here")
+
+
+def _leave(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
+    """Take one rig off a skin; the last one gives it back as it was."""
+    others = [found for found in modifier.ours(skin) if modifier.read(found, "Rest Cage") not in (cage, None)]
+    if not others:
+        stack.release(skin)
+        return
+    modifier.remove(skin, cage)
+    layers.settle(skin)
 
 
 def _read(
@@ -187,10 +243,10 @@ def _read(
     parts = [_read_skin(obj, deforming, matrix) for obj, matrix in zip(skins, to_rig, strict=False)]
     _refuse_bones(armature_object, rest, parts)
     for obj in skins:
-        unlike = modifier.unlike_weights(obj, armature_object)
+        unlike = stack.unlike_weights(obj, armature_object)
         if unlike:
             raise BindError(f"'{obj.name}' can't be bound: {unlike}")
-        blocking = modifier.blocking(obj, modifier.place(obj, armature_object))
+        blocking = stack.blocking(obj, stack.place(obj, armature_object))
         if blocking:
             raise BindError(
                 f"Modifier '{blocking}' of '{obj.name}' may change the vertices before the Armature modifier; "
@@ -221,7 +277,7 @@ def _to_rig(obj: bpy.types.Object, armature_world: Matrix, armature_name: str) -
 
 def _read_skin(obj: bpy.types.Object, deforming: dict[str, int], to_rig: Matrix) -> SkinSnapshot:
     mesh = obj.data
-    if mesh.users - mesh.use_fake_user > 1:
+    if mesh.library is None and mesh.users - mesh.use_fake_user > 1:
         raise BindError(f"The mesh of '{obj.name}' is shared with another object; make it single-user first")
     if not mesh.polygons:
         raise BindError(f"'{obj.name}' has no faces, so it can't be a skin")
@@ -266,7 +322,7 @@ def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound, 
     settings.snapshot = snapshot.write(f"{cage.name} Bind", bound.snapshot.cage, bound.snapshot.cage_faces, None)
     _make_posed_cage(context, cage, bound)
     _make_refit_armature(context, cage)
-    modifier.suspend_armature(cage, settings.armature)
+    stack.suspend_armature(cage, settings.armature)
     for index, skin in enumerate(settings.skins):
         part = bound.snapshot.skins[index]
         _remove_mesh(skin.snapshot)
@@ -279,13 +335,14 @@ def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound, 
 
 def _join(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
     settings = cage.cage_rig
-    skin.cage_rig.part, skin.cage_rig.owner = "SKIN", cage
-    ours = modifier.find(skin)
+    skin.cage_rig.part = "SKIN"
+    ours = modifier.find(skin, cage)
     if ours is None:
-        modifier.add(skin, cage, settings.posed_cage, modifier.place(skin, settings.armature))
+        modifier.add(skin, cage, settings.posed_cage, stack.place(skin, settings.armature))
     else:
-        modifier.connect(ours, cage, settings.posed_cage)
-    modifier.suspend_armature(skin, settings.armature)
+        modifier.set_inputs(ours, {"Posed Cage": settings.posed_cage})
+    layers.settle(skin)
+    stack.suspend_armature(skin, settings.armature)
 
 
 def _write_joints(cage: bpy.types.Object, bound: _Bound) -> None:
@@ -356,7 +413,7 @@ def _at_rest(context: bpy.types.Context, armature_object: bpy.types.Object) -> I
 
 
 def _remove_mesh(mesh: bpy.types.Mesh | None) -> None:
-    if mesh is not None:
+    if mesh is not None and mesh.library is None:
         bpy.data.meshes.remove(mesh)
 
 

@@ -18,6 +18,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import layers
+
 VERSION = 1
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
@@ -43,6 +45,10 @@ PARTS = [
 def _tag(settings: CageRigSettings, _context: bpy.types.Context) -> None:
     """A setting changed: let Blender update the rig."""
     settings.id_data.update_tag()
+
+
+def _may_be_input(settings: CageRigSettings, obj: bpy.types.Object) -> bool:
+    return layers.may_stand_on(settings.id_data, obj)
 
 
 class CageRigJoint(bpy.types.PropertyGroup):
@@ -71,6 +77,12 @@ class CageRigSkin(bpy.types.PropertyGroup):
 
     object: PointerProperty(type=bpy.types.Object, name="Skin", override=OVERRIDABLE)
     snapshot: PointerProperty(type=bpy.types.Mesh, name="Snapshot", override=OVERRIDABLE)
+    mask: StringProperty(
+        name="Mask",
+        description="A vertex group that confines the cage on this skin; empty: the cage acts wherever it reaches",
+        update=_tag,
+        override=OVERRIDABLE,
+    )
     skin_to_rig: FloatVectorProperty(name="Skin to Rig", subtype="MATRIX", size=(4, 4), override=OVERRIDABLE)
 
 
@@ -97,6 +109,14 @@ class CageRigSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         update=_tag,
         options={"ANIMATABLE", "LIBRARY_EDITABLE"},
+        override=OVERRIDABLE,
+    )
+    input: PointerProperty(
+        type=bpy.types.Object,
+        name="Input",
+        description="The rig that this one stands on: its cage moves the character first, then this one",
+        poll=_may_be_input,
+        update=_tag,
         override=OVERRIDABLE,
     )
     armature: PointerProperty(type=bpy.types.Object, name="Armature", override=OVERRIDABLE)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from .adapters import modifier
+from . import layers
+from .adapters import stack
 
 Key = tuple[str, str | None]  # an object's name and the path of its library
 
@@ -32,10 +33,10 @@ def forget() -> None:
 
 
 def rigs() -> list[bpy.types.Object]:
-    """The rest cage objects of all rigs in the file."""
+    """The rest cage objects of all rigs in the file, in the order in which they act."""
     if _found.count != len(bpy.data.objects):
         _look()
-    return _cages(_found.names)
+    return layers.bottom_up(_cages(_found.names))
 
 
 def key_of(obj: bpy.types.Object) -> Key:
@@ -70,13 +71,15 @@ def touched(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
     names: set[Key] = set()
     for update in depsgraph.updates:
         names |= _found.participants.get(update.id.original.session_uid, set())
-    return _cages([key for key in _found.names if key in names]) if names else []
+    return layers.bottom_up(_cages([key for key in _found.names if key in names])) if names else []
 
 
 def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
     """Every datablock whose change can matter to the rig."""
     settings = cage.cage_rig
     objects = [cage, settings.armature, settings.posed_cage, *(skin.object for skin in settings.skins)]
+    for lower in layers.below(cage):
+        objects += [lower, lower.cage_rig.posed_cage]
     found: list[bpy.types.ID] = []
     for obj in objects:
         if obj is None:
@@ -104,4 +107,4 @@ def _release_strays() -> None:
     for obj in bpy.data.objects:
         mark = obj.cage_rig
         if mark.part == "SKIN" and not (mark.owner and any(skin.object == obj for skin in mark.owner.cage_rig.skins)):
-            modifier.release(obj)
+            stack.release(obj)

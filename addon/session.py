@@ -7,7 +7,7 @@ A session is made from a bind snapshot alone and can be thrown away at any momen
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 P = ParamSpec("P")
 R = TypeVar("R")
 Points = NDArray[np.float32]
+Mask = NDArray[np.float32]
 Matrices = NDArray[np.float64]
 
 
@@ -66,6 +67,15 @@ class Snapshot:
     method: str
 
 
+@dataclass(frozen=True)
+class Below:
+    """The rig that another one stands on, and which of its skins and joints the other's are (-1: none)."""
+
+    session: Session
+    skins: list[int]
+    joints: NDArray[np.int64]
+
+
 class Session:
     """One bound rig. `play`, `edit_posed_cage` and the results mirror the core's edits and structures."""
 
@@ -90,6 +100,10 @@ class Session:
         self._links = _tail_links(snapshot)
         self._buffers = [np.empty((count, 3), np.float32) for count in counts]
         self._offsets: list[Points | None] = [None] * len(skins)
+        self._lower: list[Points | None] = [None] * len(skins)  # what the rig below moves the skins by
+        self._masks: list[Mask | None] = [None] * len(skins)
+        self._below: tuple[Session, int] | None = None
+        self._carry_coords: Matrices | None = None
         self._last: tuple[Any, ...] | None = None
         self._posed_cage: tuple[int, Points] | None = None
 
@@ -138,21 +152,90 @@ class Session:
         base = self.snapshot.cage.astype(np.float64)
         return base + (self.rig.rest_cage - base) / self.influence
 
+    @property
+    def offsets(self) -> list[Points | None]:
+        """What `offset_skins` was last given."""
+        return list(self._offsets)
+
+    @property
+    def masks(self) -> list[Mask | None]:
+        """What `mask_skins` was last given."""
+        return list(self._masks)
+
     @_door
     def offset_skins(self, offsets: list[Points | None]) -> None:
         """Add rest-pose offsets (`#M by 3`, rig space) to the skins: facial shape keys, skins moved by hand."""
         if all(_same(new, old) for new, old in zip(offsets, self._offsets, strict=True)):
             return
         self._offsets = offsets
-        if all(offset is None for offset in offsets):
-            self.rig.offset_rest_skin(None)
-        else:
-            parts = [
-                np.zeros_like(skin.points) if offset is None else offset
-                for offset, skin in zip(offsets, self.snapshot.skins, strict=True)
-            ]
-            self.rig.offset_rest_skin(np.concatenate(parts))
+        self._offset()
+
+    def _offset(self) -> None:
+        parts = [_sum(own, lower) for own, lower in zip(self._offsets, self._lower, strict=True)]
+        self.rig.offset_rest_skin(self._joined(parts, 0.0))
         self.revision += 1
+
+    @_door
+    def mask_skins(self, masks: list[Mask | None]) -> None:
+        """Confine the cage on each skin to a mask (`#M`, 0 to 1), or not at all."""
+        if all(_same(new, old) for new, old in zip(masks, self._masks, strict=True)):
+            return
+        self._masks = masks
+        self.rig.mask_skin(self._joined(masks, 1.0))
+        self.revision += 1
+
+    def _joined(self, parts: Sequence[Points | Mask | None], filling: float) -> NDArray[np.float32] | None:
+        """One array of all skins, or None where no skin has a part."""
+        known = [part for part in parts if part is not None]
+        if not known:
+            return None
+        shapes = [(len(skin.points), *known[0].shape[1:]) for skin in self.snapshot.skins]
+        return np.concatenate(
+            [
+                np.full(shape, filling, np.float32) if part is None else part
+                for part, shape in zip(parts, shapes, strict=True)
+            ]
+        )
+
+    @_door
+    def stand_on(self, below: Below | None) -> None:
+        """Take the rest character as the rig below has moved it."""
+        state = None if below is None else (below.session, below.session.revision)
+        if state == self._below:
+            return
+        if below is None:
+            self.rig.carry(None, None)
+            self._lower, self._carry_coords = [None] * len(self._lower), None
+        else:
+            lower = below.session
+            if self._below is None or self._below[0] is not lower or self._carry_coords is None:
+                cage, faces = lower.snapshot.cage, lower.snapshot.cage_faces
+                self._carry_coords = cage_rig_core.mean_value_coordinates(self.snapshot.cage, cage, faces)
+            joints = np.zeros_like(self.snapshot.heads)
+            joints[below.joints >= 0] = lower.joint_movement()[below.joints[below.joints >= 0]]
+            self.rig.carry(self._carry_coords @ lower.cage_movement(), joints)
+            self._lower = [None if skin < 0 else lower.skin_movement(skin) for skin in below.skins]
+        self._below = state
+        self._offset()
+
+    def cage_movement(self) -> Matrices:
+        """How far the rest cage is from where it was bound, `#C by 3`, its own movement and what carries it."""
+        own = self.rig.rest_cage - self.snapshot.cage.astype(np.float64)
+        if self._below is None or self._carry_coords is None:
+            return np.asarray(own)
+        return np.asarray(own + self._carry_coords @ self._below[0].cage_movement())
+
+    def joint_movement(self) -> Matrices:
+        """How far the rest joints are from where they were bound, `#J by 3`."""
+        return np.asarray(self.rig.joints - self.snapshot.heads)
+
+    def skin_movement(self, index: int) -> Points:
+        """How far cages move the rest shape of one skin, `#M by 3`; what else offsets it is left out."""
+        rest = np.empty_like(self._buffers[index])
+        self.rig.rest_skin_into(rest, start=int(self.starts[index]))
+        offset = self._offsets[index]
+        moved = rest - self.snapshot.skins[index].points
+        return moved if offset is None else moved - offset
 
     @_door
     def posed_skin(self, index: int) -> Points:
@@ -186,7 +269,13 @@ class Session:
         return self.rig.transforms @ moved
 
 
-def _same(new: Points | None, old: Points | None) -> bool:
+def _sum(one: Points | None, other: Points | None) -> Points | None:
+    if one is None or other is None:
+        return other if one is None else one
+    return one + other
+
+
+def _same(new: NDArray[np.float32] | None, old: NDArray[np.float32] | None) -> bool:
     if new is None or old is None:
         return new is old
     return np.array_equal(new, old)

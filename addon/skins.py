@@ -3,17 +3,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from . import health
-from .adapters import modifier, positions, shape_keys
-from .session import Session, SessionError
+from .adapters import modifier, positions, shape_keys, stack, vertex_groups
+from .session import Mask, Session, SessionError
 
 Points = NDArray[np.float32]
 Matrix = NDArray[np.float64]
 Written = dict[int, tuple[int, bytes]]  # skin index -> (session revision, its matrix) of the last write
+
+
+_UNREADABLE = (
+    "modifiers after Cage Rig on '{obj.name}' reorder its vertices, so that {what} can't be read; "
+    "switch one or the other off"
+)
 
 
 def to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, bool]:
@@ -27,41 +35,76 @@ def to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -
     return (bound, True) if still else (now, False)
 
 
-def offsets(
-    cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, *, readable: bool
-) -> tuple[list[Points | None], bool]:
-    """Rest-pose offsets of every skin: by its shape keys, by modifiers before ours, and by its object's moves.
+@dataclass
+class RestShape:
+    """What moves the rest shape of every skin beside the cage, and where the cage acts on it."""
 
-    Returns them with whether they are complete: what a modifier before ours does can be read from the next evaluation
-    on after our modifier was told to keep it (and not where it was hidden until now: `readable` False).
+    offsets: list[Points | None]  # #M by 3 in rig space
+    masks: list[Mask | None]  # #M
+    complete: bool = True  # False: a part can only be read from the next evaluation on
+
+
+def read(cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, *, readable: bool) -> RestShape:
+    """Offsets by shape keys, by modifiers before ours and by the object's moves; masks by vertex groups.
+
+    What a modifier before ours makes of positions or weights can be read from the next evaluation on after ours was
+    told to keep it (and not where ours was hidden until now: `readable` False). A skin in Edit Mode stays as it was.
     """
-    found: list[Points | None] = [None] * len(cage.cage_rig.skins)
-    complete = True
+    found = RestShape(session.offsets, session.masks)
     for index, obj in health.live_skins(cage):
         if obj.data.is_editmode:
             continue
-        rest = session.snapshot.skins[index].points
-        matrix, still = to_rig(cage, index, depsgraph)
-        deformed = modifier.deformed_before(obj)
-        kept = modifier.keep_input(obj, deformed)
-        complete &= kept
-        if deformed and kept and readable and modifier.find(obj).show_viewport:
-            found[index] = positions.apply_matrix(matrix, _given(obj, depsgraph)) - rest
-        else:
-            bound = np.array(cage.cage_rig.skins[index].skin_to_rig, np.float64)
-            found[index] = _without_modifiers(obj, depsgraph, rest, matrix, None if still else bound)
-    return found, complete
+        visible = readable and modifier.is_shown(obj)
+        _read_offset(found, cage, index, session, depsgraph, visible=visible)
+        _read_mask(found, cage, index, depsgraph, visible=visible)
+    return found
+
+
+def _read_offset(
+    found: RestShape,
+    cage: bpy.types.Object,
+    index: int,
+    session: Session,
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    visible: bool,
+) -> None:
+    skin = cage.cage_rig.skins[index]
+    rest = session.snapshot.skins[index].points
+    matrix, still = to_rig(cage, index, depsgraph)
+    deformed = stack.deformed_before(skin.object)
+    kept = modifier.keep_input(skin.object, deformed)
+    found.complete &= kept
+    if deformed and kept and visible:
+        found.offsets[index] = positions.apply_matrix(matrix, _given(skin.object, depsgraph)) - rest
+    else:
+        bound = None if still else np.array(skin.skin_to_rig, np.float64)
+        found.offsets[index] = _without_modifiers(skin.object, depsgraph, rest, matrix, bound)
 
 
 def _given(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points:
     """The skin as modifiers before ours deform it, in its own space."""
     given = modifier.read_input(obj, depsgraph)
     if given is None:
-        raise SessionError(
-            f"modifiers after Cage Rig on '{obj.name}' reorder its vertices, so that what the ones before it do can't "
-            "be read; switch one or the other off"
-        )
+        raise SessionError(_UNREADABLE.format(what="what the ones before it do", obj=obj))
     return given
+
+
+def _read_mask(
+    found: RestShape, cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph, *, visible: bool
+) -> None:
+    skin = cage.cage_rig.skins[index]
+    kept = modifier.keep_mask(skin.object, cage, skin.mask)
+    found.complete &= kept
+    if not skin.mask:
+        found.masks[index] = None
+    elif kept and visible:
+        mask = modifier.read_mask(skin.object, cage, depsgraph)
+        if mask is None:
+            raise SessionError(_UNREADABLE.format(what="its mask", obj=skin.object))
+        found.masks[index] = np.clip(mask, 0.0, 1.0)
+    elif found.masks[index] is None:
+        found.masks[index] = vertex_groups.read_group(skin.object, skin.mask)
 
 
 def _without_modifiers(
@@ -81,14 +124,17 @@ def _without_modifiers(
 
 
 def write(cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, written: Written) -> None:
-    """Feed posed points to the skins whose result changed since `written`. A skin in Edit Mode waits."""
+    """Feed posed points to the skins that this rig places and whose result changed since `written`.
+
+    A skin in Edit Mode waits.
+    """
     for index, obj in health.live_skins(cage):
-        if obj.data.is_editmode:
+        if obj.data.is_editmode or obj.cage_rig.owner != cage:
             written.pop(index, None)
             continue
         matrix, _ = to_rig(cage, index, depsgraph)
         state = (session.revision, matrix.tobytes())
-        if written.get(index) == state and modifier.ATTRIBUTE in obj.data.attributes:
+        if written.get(index) == state and modifier.is_fed(obj):
             continue
         points = session.posed_skin(index)
         if not np.array_equal(matrix, np.eye(4)):

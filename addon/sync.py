@@ -14,9 +14,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import health, registry, skins
-from .adapters import armature, modifier, positions, shape_keys, snapshot
-from .session import Session, SessionCrash, SessionError, SkinSnapshot, Snapshot
+from . import health, layers, linked, registry, skins
+from .adapters import armature, modifier, positions, shape_keys, snapshot, stack
+from .session import Below, Session, SessionCrash, SessionError, SkinSnapshot, Snapshot
 
 Points = NDArray[np.float32]
 Matrix = NDArray[np.float64]
@@ -73,9 +73,8 @@ def edited(depsgraph: bpy.types.Depsgraph) -> None:
     """After an update of the viewport: sync the rigs that it touched."""
     event = Event.RESTORED if _restoring else Event.EDIT
     cages = registry.touched(depsgraph)
-    cages += (
-        [cage for cage in registry.rigs() if registry.key_of(cage) in _again and cage not in cages] if _again else []
-    )
+    if _again:
+        cages = [cage for cage in registry.rigs() if registry.key_of(cage) in _again or cage in cages]
     _again.clear()
     for cage in cages:
         update(cage, depsgraph, event)
@@ -146,6 +145,12 @@ def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event)
 
 
 def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
+    if cage.library is not None and not cage.evaluated_get(depsgraph).is_evaluated:
+        return  # what a library override was made from
+    if linked.adopt(cage):
+        registry.forget()
+    for obj in layers.skins_of(cage):
+        layers.settle(obj)
     trouble = health.problem(cage)
     if trouble:
         _pause(cage, trouble)
@@ -195,9 +200,11 @@ def _start(cage: bpy.types.Object) -> _Running:
 def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:
     """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
     session, settings = running.session, cage.cage_rig
-    offsets, complete = skins.offsets(cage, session, depsgraph, readable=registry.key_of(cage) not in _again)
-    session.offset_skins(offsets)
-    if not complete:
+    session.stand_on(_below(cage))
+    shape = skins.read(cage, session, depsgraph, readable=registry.key_of(cage) not in _again)
+    session.offset_skins(shape.offsets)
+    session.mask_skins(shape.masks)
+    if not shape.complete:
         _ask_again(cage)
     transforms, rest_joints = _read_pose(cage, running, depsgraph)
     shown = cage.evaluated_get(depsgraph).cage_rig  # both may be animated
@@ -222,6 +229,22 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     session.play(known, transforms, rest_joints, influence)
     running.posed = posed
     return _take_posed_edit(cage, running, posed) if is_edit else ""
+
+
+def _below(cage: bpy.types.Object) -> Below | None:
+    """The running rig that this one stands on, and which skins and joints they share."""
+    lower = cage.cage_rig.input
+    if lower is None:
+        return None
+    skins = {skin.object: index for index, skin in enumerate(lower.cage_rig.skins)}
+    joints = {joint.name: index for index, joint in enumerate(lower.cage_rig.joints)}
+    if lower.session_uid not in _running:
+        raise SessionError(f"'{lower.name}', on which it stands, is not evaluated; show it in this view layer")
+    return Below(
+        _running[lower.session_uid].session,
+        [skins.get(skin.object, -1) for skin in cage.cage_rig.skins],
+        np.array([joints.get(joint.name, -1) for joint in cage.cage_rig.joints], np.int64),
+    )
 
 
 def _recall(cage: bpy.types.Object, running: _Running, rest: Points, posed: Points) -> str:
@@ -292,6 +315,8 @@ def _refuse_deformed_cage(cage: bpy.types.Object) -> None:
 
 
 def _move_rest_cage(cage: bpy.types.Object, before: Points, wanted: Matrix) -> None:
+    if linked.own_mesh(cage):
+        registry.forget()
     from_rig = np.linalg.inv(_matrix(cage.cage_rig.cage_to_rig))
     if cage.data.is_editmode:
         positions.write_edit_mesh(cage.data, positions.apply_matrix(from_rig, wanted))
@@ -389,12 +414,11 @@ def _pause(cage: bpy.types.Object, message: str) -> None:
     settings = cage.cage_rig
     if (settings.state, settings.message) == ("PAUSED", message):
         return
-    owned = settings.posed_cage is None or settings.posed_cage.cage_rig.owner in (cage, None)
     settings.state, settings.message = "PAUSED", message
-    for skin in settings.skins:
-        if owned and skin.object is not None:
-            modifier.set_shown(skin.object, False)
-            modifier.show_suspended(skin.object, True)
+    for obj in layers.skins_of(cage):
+        if obj.cage_rig.owner == cage:
+            modifier.set_shown(obj, False)
+            stack.show_suspended(obj, True)
 
 
 def _resume(cage: bpy.types.Object, note: str) -> None:
@@ -402,9 +426,9 @@ def _resume(cage: bpy.types.Object, note: str) -> None:
     if settings.state != "LIVE":
         settings.state = "LIVE"
         for _, obj in health.live_skins(cage):
-            modifier.show_suspended(obj, False)
+            stack.show_suspended(obj, False)
             modifier.set_shown(obj, True)
-            if modifier.deformed_before(obj):
+            if stack.reads_back(obj):
                 _ask_again(cage)
     lost = health.lost_skins(cage)
     if not note and lost:

@@ -405,7 +405,7 @@ def skin_parented_to_a_bone() -> RigObjects:
     rig = _bent()
     skin = rig.skins[0]
     skin.parent, skin.parent_type, skin.parent_bone = rig.armature, "BONE", "bone.0"
-    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(FRAMES[0])
     skin.matrix_parent_inverse = (skin.matrix_world @ skin.matrix_basis.inverted()).inverted()
     _turn(rig, 0, (0.2, 0.3, 0.1))
     return rig

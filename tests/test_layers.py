@@ -16,14 +16,16 @@ CORE = ROOT / "rust_core/cage_rig/src"
 # What a module of the add-on may import: packages from outside, and modules of ours.
 ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "compat": ({"bpy"}, set()),
-    "props": ({"bpy"}, set()),
+    "props": ({"bpy"}, {"layers"}),
     "session": ({"cage_rig_core", "numpy"}, set()),
     "adapters": ({"bpy", "bmesh", "mathutils", "numpy"}, {"adapters", "compat"}),
-    "registry": ({"bpy"}, {"adapters"}),
-    "health": ({"bpy", "numpy"}, {"adapters"}),
+    "layers": ({"bpy"}, {"adapters"}),
+    "linked": ({"bpy"}, {"adapters"}),
+    "registry": ({"bpy"}, {"adapters", "layers"}),
+    "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
-    "sync": ({"bpy", "numpy"}, {"adapters", "health", "registry", "session", "skins"}),
-    "lifecycle": ({"bpy", "numpy"}, {"adapters", "health", "props", "session", "sync"}),
+    "sync": ({"bpy", "numpy"}, {"adapters", "health", "layers", "linked", "registry", "session", "skins"}),
+    "lifecycle": ({"bpy", "numpy"}, {"adapters", "health", "layers", "props", "session", "sync"}),
     "bake": (
         {"bpy", "mathutils", "numpy", "pathlib", "struct"},
         {"adapters", "bake", "compat", "health", "skins", "sync"},
@@ -91,6 +93,12 @@ def test_coordinates_and_skinning_know_nothing_above_them() -> None:
         assert uses(folder)
         for path, named in uses(folder).items():
             assert not named & {other, "sync", "caging"}, path
+
+
+def test_geometry_knows_neither_cages_nor_skeletons() -> None:
+    assert uses("geometry")
+    for path, named in uses("geometry").items():
+        assert named <= {"points", "geometry", "fixtures"}, path
 
 
 def test_only_linalg_names_faer() -> None:

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from .. import compat
 
 Matrices = NDArray[np.float64]
+Inheritance = tuple[bool, bool, str]  # rotation, location along the bone's own axes, scale
+INHERITS_ALL: Inheritance = (True, True, "FULL")
+INHERITS_PLACE: Inheritance = (False, True, "NONE")
 HELPER = "cage_rig_helper"  # marks bones that `add_helpers` made
 
 
@@ -194,10 +197,20 @@ def disconnect(obj: bpy.types.Object, context: bpy.types.Context, names: list[st
                 bones[name].use_connect = False
 
 
-def add_helpers(obj: bpy.types.Object, context: bpy.types.Context, names: list[str]) -> dict[str, str]:
-    """Put a bone that inherits neither turn nor scale between each of these bones and its parent. Object Mode.
+def inheritance(bone: bpy.types.Bone | bpy.types.EditBone) -> Inheritance:
+    """What the bone inherits of its parent's pose."""
+    return bone.use_inherit_rotation, bone.use_local_location, bone.inherit_scale
 
-    It rests where the bone rests, moves no skin, and hands on everything. Returns the names by the bones'.
+
+def set_inheritance(bone: bpy.types.Bone | bpy.types.EditBone, inherits: Inheritance) -> None:
+    """Set what the bone inherits of its parent's pose."""
+    bone.use_inherit_rotation, bone.use_local_location, bone.inherit_scale = inherits
+
+
+def add_helpers(obj: bpy.types.Object, context: bpy.types.Context, names: list[str]) -> dict[str, str]:
+    """Put a bone that moves no skin between each of these bones and its parent. Object Mode.
+
+    It rests where the bone rests; both inherit everything. Returns the names by the bones'.
     """
     if not names:
         return {}
@@ -208,12 +221,11 @@ def add_helpers(obj: bpy.types.Object, context: bpy.types.Context, names: list[s
             made[name] = helper.name
             helper[HELPER] = True
             helper.head, helper.tail, helper.roll = bone.head, bone.tail, bone.roll
-            helper.use_deform = helper.use_inherit_rotation = False
-            helper.inherit_scale = "NONE"
+            helper.use_deform = False
             helper.parent, bone.use_connect = bone.parent, False
             bone.parent = helper
-            bone.use_inherit_rotation = bone.use_local_location = True
-            bone.inherit_scale = "FULL"
+            set_inheritance(helper, INHERITS_ALL)
+            set_inheritance(bone, INHERITS_ALL)
             for collection in bone.collections:
                 collection.assign(helper)
     return made

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Location, rotation and scale keys that pose a bone at given matrices, in whatever its parent hands on to it.
+"""Location, rotation and scale keys that pose a bone at given matrices, in what its parent hands on to it.
 
-A bone without constraints gets back what the artist keyed, as a refit keeps every bone's turn, scale and offset.
-Another one gets what its matrix is against its parent's, or against nothing where the parent's is sheared. A matrix
-that is sheared itself is a turn, a scale and another turn: two bones, one above the other, can be keyed to that.
+Bones inherit everything, as in a scene graph, so that every exporter can write them. A bone without constraints gets
+back what the artist keyed, as a refit keeps every bone's turn, scale and offset; another one what its matrix is against
+its parent's. Where that is sheared, it is a turn, a scale and another turn (its singular value decomposition), which
+two bones can be keyed to, one the other's parent.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 from numpy.typing import NDArray
+
+from ..adapters import armature
 
 Array = NDArray[np.float64]
 Channels = tuple[Vector, Quaternion, Vector]
@@ -47,15 +50,15 @@ class Solved:
     keys: Array
     posed: list[Matrix]  # #F
     error: float  # largest distance of `reach` from where it should be
+    inherits: armature.Inheritance
     connected: bool = False  # whether its location is 0 throughout, as a connected bone's
-    free: bool = False  # whether the bone has to inherit neither turn nor scale
-    helper: Array | None = None  # keys of a free bone at its place, which then is its parent
+    helper: Array | None = None  # keys of a bone at its place, which then is its parent
 
 
 def solve(asked: Bone, tolerance: float) -> Solved:
     """The first way to key the bone that keeps `reach` within `tolerance`, or the best one.
 
-    Changes how the bone inherits from its parent, where that has to be.
+    Sets what the bone inherits from its parent.
     """
     found = []
     for solved in _ways(asked):
@@ -63,31 +66,29 @@ def solve(asked: Bone, tolerance: float) -> Solved:
         if solved.error <= tolerance:
             break
     best = min(found, key=lambda solved: solved.error)
-    if best.free:
-        _set_inherited(asked.bone, False, "NONE")
+    armature.set_inheritance(asked.bone, best.inherits)
     return best
 
 
 def _ways(asked: Bone) -> Iterator[Solved]:
-    """From the one that changes least to the one that changes most."""
-    bone = asked.bone
-    for channels in (_keyed, _inverted):
-        if bone.use_connect:
-            unmoved = [(Vector(), turn, size) for _, turn, size in channels(asked)]
-            yield replace(_try(asked, unmoved), connected=True)
-        if not bone.use_connect or channels is _inverted:
-            yield _try(asked, channels(asked))
-    before = bone.use_inherit_rotation, bone.inherit_scale
-    _set_inherited(bone, False, "NONE")
-    found = [replace(_try(asked, _inverted(asked)), free=True)]
+    """The best first. Without a helper, a sheared bone of no weight can do with what it inherited or with nothing."""
+    before = armature.inheritance(asked.bone)
+    yield from _plain(asked, armature.INHERITS_ALL)
     if asked.deforms:
-        found.append(_helped(asked))
-    _set_inherited(bone, *before)
-    yield from found
+        armature.set_inheritance(asked.bone, armature.INHERITS_ALL)
+        yield _helped(asked)
+    yield from _plain(asked, before)
+    yield from _plain(asked, armature.INHERITS_PLACE)
 
 
-def _set_inherited(bone: bpy.types.Bone, turn: bool, scale: str) -> None:
-    bone.use_inherit_rotation, bone.inherit_scale = turn, scale
+def _plain(asked: Bone, inherits: armature.Inheritance) -> Iterator[Solved]:
+    for channels in (_keyed, _inverted):
+        armature.set_inheritance(asked.bone, inherits)
+        found = channels(asked)
+        if asked.bone.use_connect:
+            yield replace(_try(asked, [(Vector(), turn, size) for _, turn, size in found]), connected=True)
+        if not asked.bone.use_connect or channels is _inverted:
+            yield _try(asked, found)
 
 
 def _keyed(asked: Bone) -> list[Channels]:
@@ -95,31 +96,30 @@ def _keyed(asked: Bone) -> list[Channels]:
 
 
 def _inverted(asked: Bone) -> list[Channels]:
-    return [matrix.decompose() for matrix in _inverted_all(asked, asked.wanted)]
+    return [matrix.decompose() for matrix in _relative(asked)]
 
 
-def _inverted_all(asked: Bone, posed: list[Matrix]) -> list[Matrix]:
-    return [_in_parent(asked, k, matrix, invert=True) for k, matrix in enumerate(posed)]
+def _relative(asked: Bone) -> list[Matrix]:
+    """What is wanted, as channels' matrices: against what the parent hands on."""
+    return [_in_parent(asked, k, matrix, invert=True) for k, matrix in enumerate(asked.wanted)]
 
 
 def _try(asked: Bone, channels: list[Channels]) -> Solved:
     posed = [_in_parent(asked, k, Matrix.LocRotScale(*channel)) for k, channel in enumerate(channels)]
-    return Solved(rows(channels), posed, _error(asked, posed))
+    return Solved(rows(channels), posed, _error(asked, posed), armature.inheritance(asked.bone))
 
 
 def _helped(asked: Bone) -> Solved:
-    """A free helper takes the first turn and the scale, the bone turns in it. The bone is set free already."""
-    outer, inner = [], []
+    """A helper takes the first turn and the scale, the bone turns in it."""
+    helper, inner, posed = [], [], []
     before = np.eye(3)
-    for matrix in asked.wanted:
+    for k, matrix in enumerate(_relative(asked)):
         left, scale, before = _turn_scale_turn(np.array(matrix.to_3x3()), before)
-        outer.append(Matrix.Translation(matrix.translation) @ Matrix(left * scale).to_4x4())
-        inner.append(Matrix(before.T).to_quaternion())
-    helper = [matrix.decompose() for matrix in _inverted_all(asked, outer)]
-    carried = [_in_parent(asked, k, Matrix.LocRotScale(*channel)) for k, channel in enumerate(helper)]
-    posed = [matrix @ turn.to_matrix().to_4x4() for matrix, turn in zip(carried, inner, strict=True)]
-    keys = rows([(Vector(), turn, Vector((1.0, 1.0, 1.0))) for turn in inner])
-    return Solved(keys, posed, _error(asked, posed), helper=rows(helper))
+        helper.append((matrix.translation, Matrix(left).to_quaternion(), Vector(scale)))
+        inner.append((Vector(), Matrix(before.T).to_quaternion(), Vector((1.0, 1.0, 1.0))))
+        posed.append(_in_parent(asked, k, Matrix.LocRotScale(*helper[-1])) @ Matrix.LocRotScale(*inner[-1]))
+    found = Solved(rows(inner), posed, _error(asked, posed), armature.INHERITS_ALL)
+    return replace(found, helper=rows(helper))
 
 
 def _turn_scale_turn(linear: Array, near: Array) -> tuple[Array, Array, Array]:

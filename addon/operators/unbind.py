@@ -21,6 +21,10 @@ class CAGE_RIG_OT_unbind(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = props.rig_of(context.object)
-        lifecycle.unbind(cage)
+        try:
+            lifecycle.unbind(cage)
+        except lifecycle.BindError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         self.report({"INFO"}, f"'{cage.name}' is an ordinary mesh again")
         return {"FINISHED"}

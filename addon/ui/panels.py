@@ -53,6 +53,8 @@ def _draw_settings(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
     column.use_property_decorate = False
     column.prop(settings, "method")
     column.prop(settings, "influence", slider=True)
+    if settings.input is not None:
+        column.prop(settings, "input")
     parts = layout.column(align=True)
     _draw_part(parts, cage, "Rest Cage", "MESH_CUBE")
     _draw_part(parts, settings.posed_cage, "Posed Cage", "MOD_MESHDEFORM")
@@ -60,6 +62,8 @@ def _draw_settings(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
     _draw_part(parts, settings.refit_armature, "Refit Bones", "BONE_DATA")
     for skin in settings.skins:
         _draw_part(parts, skin.object, "Skin", "OUTLINER_OB_MESH")
+        if skin.object is not None:
+            parts.prop_search(skin, "mask", skin.object, "vertex_groups", text="")
 
 
 def _draw_part(layout: bpy.types.UILayout, obj: bpy.types.Object | None, label: str, icon: str) -> None:

@@ -237,13 +237,12 @@ def test_refusals_say_what_and_change_nothing(spoil: object) -> None:
     assert file_state() == before
 
 
-def test_a_bound_skin_is_refused_by_name(bar: Rig) -> None:
-    other = bpy.data.objects.new("Second", bar.cage.data.copy())
-    bpy.context.scene.collection.objects.link(other)
-    select([bar.skin, bar.armature, other], other)
+def test_a_skin_of_another_armatures_rig_is_refused_by_name(bar: Rig) -> None:
+    other = build_bar()
+    select([bar.skin, other.armature, other.cage], other.cage)
     with pytest.raises(RuntimeError, match=bar.cage.name):
         bpy.ops.cage_rig.bind()
-    assert bar.settings.state == "LIVE"
+    assert other.cage.cage_rig.state == "NONE" and bar.settings.state == "LIVE"
 
 
 def test_a_cage_inside_out_is_turned() -> None:

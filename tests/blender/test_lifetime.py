@@ -56,41 +56,6 @@ def test_append_into_another_file(bar: Rig, tmp_path: Path) -> None:
     assert np.abs(shown(skin) - rest(skin)).max() < 1e-5
 
 
-@pytest.mark.parametrize("how", ["instance", "override"])
-def test_a_linked_character_is_paused_and_plain(bar: Rig, how: str, tmp_path: Path) -> None:
-    """Linked meshes can't be written; the rig says so and the character plays as Blender alone plays it."""
-    bend(bar, 1.0)
-    fat_key(bar)
-    home = bpy.data.collections.new("Character")
-    bpy.context.scene.collection.children.link(home)
-    for obj in (bar.skin, bar.armature, bar.cage, bar.posed, bar.refit):
-        for collection in obj.users_collection:
-            collection.objects.unlink(obj)
-        home.objects.link(obj)
-    update()
-    plain = native(bar.skin)
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(path, link=True) as (_, wanted):
-        wanted.collections = ["Character"]
-    if how == "instance":
-        empty = bpy.data.objects.new("Empty", None)
-        empty.instance_type, empty.instance_collection = "COLLECTION", wanted.collections[0]
-        bpy.context.scene.collection.objects.link(empty)
-    else:
-        bpy.context.scene.collection.children.link(wanted.collections[0])
-        view_layer = bpy.context.view_layer
-        wanted.collections[0].override_hierarchy_create(bpy.context.scene, view_layer, do_fully_editable=True)
-    update()
-    cages = [obj for obj in bpy.data.objects if obj.cage_rig.state != "NONE"]
-    assert len(cages) == (1 if how == "instance" else 2)
-    visible = next(cage for cage in cages if (cage.library is not None) == (how == "instance"))
-    assert visible.cage_rig.state == "PAUSED" and "linked" in visible.cage_rig.message
-    update()
-    assert np.abs(shown(visible.cage_rig.skins[0].object) - plain).max() < 1e-5
-
-
 def test_duplicate_of_the_whole_character_lives_on_its_own(bar: Rig) -> None:
     bend(bar, 0.5)
     select([*bar.skins, bar.armature, bar.cage, bar.posed, bar.refit], bar.cage)

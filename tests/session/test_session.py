@@ -171,3 +171,41 @@ def test_a_panic_of_the_core_is_a_session_crash(
     monkeypatch.setattr(live, "rig", Panicking())
     with pytest.raises(session.SessionCrash, match="index out of bounds"):
         live.play(snapshot.cage, bend(snapshot, 1.0), snapshot.heads)
+
+
+def test_masks_and_offsets_of_one_skin_leave_the_other(live: object, snapshot: object) -> None:
+    live.play(snapshot.cage * np.float32([1, 1.5, 1.5]), bend(snapshot, 0.0), snapshot.heads)
+    before = [live.posed_skin(k).copy() for k in range(2)]
+    live.mask_skins([None, np.zeros(len(snapshot.skins[1].points), np.float32)])
+    assert np.array_equal(live.posed_skin(0), before[0])
+    assert np.abs(live.posed_skin(1) - snapshot.skins[1].points).max() < 1e-6
+    revision = live.revision
+    live.mask_skins([None, np.zeros(len(snapshot.skins[1].points), np.float32)])
+    assert live.revision == revision, "the same mask is no change"
+    live.mask_skins([None, None])
+    assert np.array_equal(live.posed_skin(1), before[1])
+
+
+def test_a_session_stands_on_another_and_follows_it(session: ModuleType, snapshot: object) -> None:
+    lower, upper = session.Session(snapshot), session.Session(snapshot)
+    transforms = bend(snapshot, 0.8)
+    fat = snapshot.cage * np.float32([1.3, 1.5, 1.5])
+    lower.play(fat, transforms, snapshot.heads)
+    upper.play(snapshot.cage, transforms, snapshot.heads)
+    below = session.Below(lower, [0, -1], np.arange(2))
+    upper.stand_on(below)
+    assert np.abs(upper.posed_skin(0) - lower.posed_skin(0)).max() < 2e-6
+    assert np.abs(upper.joints - lower.joints).max() < 1e-12
+    assert np.abs(upper.cage_movement() - (fat - snapshot.cage)).max() < 1e-6
+    assert np.abs(upper.skin_movement(0) - lower.skin_movement(0)).max() < 1e-6
+    assert np.abs(upper.skin_movement(1)).max() == 0.0, "the lower one does not have this skin"
+    revision = upper.revision
+    upper.stand_on(below)
+    assert upper.revision == revision, "nothing has changed below"
+    lower.play(snapshot.cage, transforms, snapshot.heads)
+    upper.stand_on(below)
+    alone = session.Session(snapshot)
+    alone.play(snapshot.cage, transforms, snapshot.heads)
+    assert np.abs(upper.posed_skin(0) - alone.posed_skin(0)).max() < 2e-6
+    upper.stand_on(None)
+    assert np.abs(upper.posed_skin(0) - alone.posed_skin(0)).max() < 2e-6

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Geometry Nodes group behind the "Cage Rig" modifier.
+
+It places vertices where the feed says: a point attribute of the mesh, or, where the mesh can't be written because it is
+linked from another file, the vertices of a feed object. Without a feed it moves nothing. On request it keeps what it is
+given (positions, a mask) as attributes of its result, for the next update to read. It takes the rest cage and the posed
+cage as inputs so that Blender evaluates them, also where they are hidden.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+NAME = "Cage Rig"
+ATTRIBUTE = "cage_rig.posed"
+INPUT = "cage_rig.input"
+INDEX = "cage_rig.index"  # kept beside the two: the proof that modifiers after ours reorder nothing
+
+SOCKETS = {
+    "Attribute": "NodeSocketString",
+    "Use Feed": "NodeSocketBool",
+    "Feed": "NodeSocketObject",
+    "Rest Cage": "NodeSocketObject",
+    "Posed Cage": "NodeSocketObject",
+    "Keep Input": "NodeSocketBool",
+    "Keep Mask": "NodeSocketBool",
+    "Mask": "NodeSocketString",
+    "Mask As": "NodeSocketString",
+}
+
+
+def node_group() -> bpy.types.NodeTree:
+    """The shared node group of this file, made on first use."""
+    for group in bpy.data.node_groups:
+        if group.get("cage_rig") and group.library is None:
+            return group
+    group = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
+    group["cage_rig"] = True
+    group.is_modifier = True
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    for name, kind in SOCKETS.items():
+        group.interface.new_socket(name, in_out="INPUT", socket_type=kind)
+    _Builder(group).build()
+    return group
+
+
+def identifier(group: bpy.types.NodeTree, name: str) -> str:
+    """The identifier of an input of the group, by which a modifier holds its value."""
+    return next(
+        item.identifier
+        for item in group.interface.items_tree
+        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+    )
+
+
+def _socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
+    """The enabled socket of this name: a node keeps one for every data type."""
+    return next(socket for socket in sockets if socket.name == name and socket.enabled)
+
+
+class _Builder:
+    """Adds nodes from left to right."""
+
+    def __init__(self, group: bpy.types.NodeTree) -> None:
+        self.group = group
+        self.source = self.node("NodeGroupInput")
+
+    def node(self, kind: str, **settings: str) -> bpy.types.Node:
+        node = self.group.nodes.new(kind)
+        node.location = (180 * (len(self.group.nodes) - 1), 0)
+        for name, value in settings.items():
+            setattr(node, name, value)
+        return node
+
+    def link(self, source: bpy.types.NodeSocket, node: bpy.types.Node, name: str) -> None:
+        self.group.links.new(source, _socket(node.inputs, name))
+
+    def given(self, name: str) -> bpy.types.NodeSocket:
+        return self.source.outputs[name]
+
+    def build(self) -> None:
+        index = self.node("GeometryNodeInputIndex").outputs["Index"]
+        position = self.node("GeometryNodeInputPosition").outputs["Position"]
+        mask = self.node("GeometryNodeInputNamedAttribute", data_type="FLOAT")
+        self.link(self.given("Mask"), mask, "Name")
+        geometry = self.given("Geometry")
+        for switch, name, kind, value in (
+            ("Keep Input", INPUT, "FLOAT_VECTOR", position),
+            ("Keep Mask", self.given("Mask As"), "FLOAT", _socket(mask.outputs, "Attribute")),
+        ):
+            stored = self.stored(self.stored(geometry, name, kind, value), INDEX, "FLOAT", index)
+            geometry = self.either(switch, geometry, stored)
+        placed = self.either("Use Feed", self.by_attribute(geometry), self.by_feed(geometry, index, position))
+        self.link(placed, self.node("NodeGroupOutput"), "Geometry")
+
+    def stored(
+        self, geometry: bpy.types.NodeSocket, name: str | bpy.types.NodeSocket, kind: str, value: bpy.types.NodeSocket
+    ) -> bpy.types.NodeSocket:
+        node = self.node("GeometryNodeStoreNamedAttribute", data_type=kind, domain="POINT")
+        if isinstance(name, str):
+            node.inputs["Name"].default_value = name
+        else:
+            self.link(name, node, "Name")
+        self.link(geometry, node, "Geometry")
+        self.link(value, node, "Value")
+        return node.outputs["Geometry"]
+
+    def either(self, switch: str, off: bpy.types.NodeSocket, on: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        node = self.node("GeometryNodeSwitch", input_type="GEOMETRY")
+        self.link(self.given(switch), node, "Switch")
+        self.link(off, node, "False")
+        self.link(on, node, "True")
+        return _socket(node.outputs, "Output")
+
+    def by_attribute(self, geometry: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        named = self.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
+        self.link(self.given("Attribute"), named, "Name")
+        place = self.node("GeometryNodeSetPosition")
+        self.link(geometry, place, "Geometry")
+        self.link(named.outputs["Exists"], place, "Selection")
+        self.link(_socket(named.outputs, "Attribute"), place, "Position")
+        return place.outputs["Geometry"]
+
+    def by_feed(
+        self, geometry: bpy.types.NodeSocket, index: bpy.types.NodeSocket, position: bpy.types.NodeSocket
+    ) -> bpy.types.NodeSocket:
+        feed = self.node("GeometryNodeObjectInfo")
+        self.link(self.given("Feed"), feed, "Object")
+        sample = self.node("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
+        self.link(feed.outputs["Geometry"], sample, "Geometry")
+        self.link(position, sample, "Value")
+        self.link(index, sample, "Index")
+        place = self.node("GeometryNodeSetPosition")
+        self.link(geometry, place, "Geometry")
+        self.link(_socket(sample.outputs, "Value"), place, "Position")
+        return place.outputs["Geometry"]
