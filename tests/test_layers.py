@@ -28,7 +28,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "lifecycle": ({"bpy", "numpy"}, {"adapters", "health", "layers", "props", "session", "sync"}),
     "bake": (
         {"bpy", "mathutils", "numpy", "pathlib", "struct"},
-        {"adapters", "bake", "compat", "health", "skins", "sync"},
+        {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
     ),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),

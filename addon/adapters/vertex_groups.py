@@ -49,6 +49,20 @@ def write_weights(obj: bpy.types.Object, names: list[str], weights: Csr) -> None
             add((vertex,), share, "REPLACE")
 
 
+def named(obj: bpy.types.Object) -> set[str]:
+    """Groups that modifiers or shape keys of the object go by; all of them where node groups may do so."""
+    if any(mod.type == "NODES" for mod in obj.modifiers):
+        return {group.name for group in obj.vertex_groups}
+    found = {
+        getattr(mod, prop.identifier)
+        for mod in obj.modifiers
+        for prop in mod.bl_rna.properties
+        if prop.type == "STRING"
+    }
+    keys = obj.data.shape_keys
+    return found if keys is None else found | {block.vertex_group for block in keys.key_blocks}
+
+
 def read_group(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
     """Weights of one vertex group, `#V`; zero where a vertex is not in it or the group is gone."""
     weights = np.zeros(len(obj.data.vertices), np.float32)

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 
 import bpy
 
-from ..adapters import modifier
+from ..adapters import modifier, stack
+from .live import Skin
 
 
 class Draft:
@@ -23,9 +24,11 @@ class Draft:
         self.made.append(datablock)
 
     def copy(self, source: bpy.types.Object, name: str) -> bpy.types.Object:
-        """A copy of an object and its data that has nothing to do with any rig."""
+        """A copy of an object and its data, of this file, that has nothing to do with any rig."""
         obj = source.copy()
         self.add(obj)
+        if obj.override_library is not None:
+            obj.make_local(clear_liboverride=True)
         obj.data = source.data.copy()
         self.add(obj.data)
         obj.name = obj.data.name = name
@@ -34,20 +37,23 @@ class Draft:
         self.objects.append(obj)
         return obj
 
-    def copy_skin(self, skin: bpy.types.Object, name: str) -> tuple[bpy.types.Object, int]:
-        """A copy of a skin without our modifier and those that it stands in for or takes into account.
+    def copy_skin(self, skin: Skin, name: str) -> tuple[bpy.types.Object, int]:
+        """A copy of a skin without our modifiers and those that they stand in for or take into account.
 
-        Returns it with the place in its modifiers where ours was. Its shape keys are still there.
+        Returns it with the place in its modifiers where the one was that places the vertices. Its shape keys are still
+        there.
         """
-        suspended = {record.name for record in skin.cage_rig.suspended}
-        obj = self.copy(skin, name)
-        ours = modifier.find(obj)
-        place = list(obj.modifiers).index(ours)
-        for index, mod in reversed(list(enumerate(obj.modifiers))):
-            taken = index < place and mod.type in modifier.DEFORMING
-            if mod == ours or taken or mod.name in suspended:
+        source, suspended = skin.obj, {record.name for record in skin.obj.cage_rig.suspended}
+        leader = list(source.modifiers).index(modifier.find(source, skin.cage))
+        ours = {mod.name for mod in modifier.ours(source)}
+        obj = self.copy(source, name)
+        place = 0
+        for index, mod in enumerate(list(obj.modifiers)):
+            taken = index < leader and mod.type not in stack.HARMLESS
+            if taken or mod.name in ours | suspended:
                 obj.modifiers.remove(mod)
-                place -= index < place
+            elif index < leader:
+                place += 1
         for attribute in [a.name for a in obj.data.attributes if a.name.startswith("cage_rig.")]:
             obj.data.attributes.remove(obj.data.attributes[attribute])
         if obj.parent_type == "ARMATURE":

@@ -6,13 +6,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from typing import TypeVar
 
 import bpy
 import numpy as np
 
-from .. import health, skins, sync
+from .. import health, layers, registry, skins, sync
 from ..adapters import positions
+from ..session import Session
 
 R = TypeVar("R")
 # A bake on its way: yields its progress, 0 to 1, and returns what it made. Closing it takes back what it has begun.
@@ -48,18 +50,50 @@ def times(start: int, end: int, *, samples: int = 1, step: int = 1) -> list[floa
 
 def refuse_unready(cage: bpy.types.Object) -> None:
     """Raise `BakeError` where the rig does not run, or Blender is in another mode than Object Mode."""
-    settings = cage.cage_rig
-    if settings.state == "NONE":
+    if cage.cage_rig.state == "NONE":
         raise BakeError(f"'{cage.name}' is not the cage of a rig; bind it first")
-    if settings.state != "LIVE":
-        raise BakeError(f"'{cage.name}' is paused: {settings.message}")
+    for rig in rigs(cage):
+        if rig.cage_rig.state != "LIVE":
+            raise BakeError(f"'{rig.name}' is paused: {rig.cage_rig.message}")
     if bpy.context.mode != "OBJECT":
         raise BakeError("Bake in Object Mode")
 
 
-def live_skins(cage: bpy.types.Object) -> list[bpy.types.Object]:
-    """The rig's skins that were not deleted, in the rig's order."""
-    return [obj for _, obj in health.live_skins(cage)]
+@dataclass(frozen=True)
+class Skin:
+    """A skin of the character, and the rig that places its vertices: the one on top, where several do something."""
+
+    obj: bpy.types.Object
+    cage: bpy.types.Object
+    index: int  # among that rig's skins
+
+    @property
+    def session(self) -> Session:
+        """Of that rig."""
+        return sync.session_of(self.cage)
+
+
+def rigs(cage: bpy.types.Object) -> list[bpy.types.Object]:
+    """The rigs of the character: the one at the bottom first, then those that stand on it."""
+    bottom = [cage, *layers.below(cage)][-1]
+    return layers.bottom_up([other for other in registry.rigs() if bottom in (other, *layers.below(other))])
+
+
+def skins_of(cage: bpy.types.Object) -> list[Skin]:
+    """The character's skins that were not deleted."""
+    found: dict[str, Skin] = {}
+    for rig in rigs(cage):
+        for index, obj in health.live_skins(rig):
+            if obj.name not in found or obj.cage_rig.owner == rig:
+                found[obj.name] = Skin(obj, rig, index)
+    return list(found.values())
+
+
+def refuse_paused(cage: bpy.types.Object, time: float) -> None:
+    """Raise `BakeError` where a rig of the character does not run at this time."""
+    for rig in rigs(cage):
+        if rig.cage_rig.state != "LIVE":
+            raise BakeError(f"'{rig.name}' is paused at frame {time:g}: {rig.cage_rig.message}")
 
 
 @contextmanager
@@ -75,14 +109,14 @@ def playing(cage: bpy.types.Object, first: float) -> Iterator[Callable[[float], 
         whole = math.floor(time)
         scene.frame_set(whole, subframe=time - whole)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        if cage.cage_rig.state != "LIVE":
-            raise BakeError(f"'{cage.name}' is paused at frame {time:g}: {cage.cage_rig.message}")
-        for obj in live_skins(cage):
+        refuse_paused(cage, time)
+        for obj in objects:
             if not obj.evaluated_get(depsgraph).is_evaluated:
                 raise BakeError(f"'{obj.name}' is hidden at frame {time:g}, so that Blender does not evaluate it")
         return depsgraph
 
-    with shown(live_skins(cage)):
+    objects = [skin.obj for skin in skins_of(cage)]
+    with shown(objects):
         try:
             go(first)  # what modifiers before ours do can be read from the second time on
             yield go
@@ -118,13 +152,12 @@ def _set(obj: bpy.types.Object, **values: bool) -> None:
 
 
 def posed_skins(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[positions.Points]:
-    """What our modifier gives each of `live_skins` now, `#M by 3` in the skin's own space.
+    """What our modifier gives each of `skins_of` now, `#M by 3` in the skin's own space.
 
-    From the session that feeds them, so that modifiers after ours, and how it is fed, do not matter.
+    From the sessions that feed them, so that modifiers after ours, and how it is fed, do not matter.
     """
-    session = sync.session_of(cage)
     found = []
-    for index, _ in health.live_skins(cage):
-        to_rig, _ = skins.to_rig(cage, index, depsgraph)
-        found.append(positions.apply_matrix(np.linalg.inv(to_rig), session.posed_skin(index)))
+    for skin in skins_of(cage):
+        to_rig, _ = skins.to_rig(skin.cage, skin.index, depsgraph)
+        found.append(positions.apply_matrix(np.linalg.inv(to_rig), skin.session.posed_skin(skin.index)))
     return found

@@ -11,7 +11,7 @@ import bpy
 
 from . import files, pc2
 from .drafts import Draft, draft
-from .live import Steps, live_skins, playing, posed_skins, refuse_unready, times
+from .live import Skin, Steps, playing, posed_skins, refuse_unready, skins_of, times
 
 SUFFIXES = (".pc2",)
 
@@ -37,12 +37,12 @@ def steps(
     """See `to_mesh_cache`."""
     refuse_unready(cage)
     at = times(frame_start, frame_end, samples=samples)
-    skins = live_skins(cage)
+    skins = skins_of(cage)
     paths = _paths(cage, path, skins)
     with draft() as made, files.written(paths) as drafts, ExitStack() as stack:
         opened = [stack.enter_context(file.open("wb")) for file in drafts]
         for file, skin in zip(opened, skins, strict=True):
-            count = len(skin.data.vertices)
+            count = len(skin.obj.data.vertices)
             pc2.write_header(file, points=count, start=frame_start, rate=1.0 / samples, samples=len(at))
         with playing(cage, at[0]) as go:
             for index, time in enumerate(at):
@@ -57,22 +57,22 @@ def steps(
         return MeshCaches(paths, made.finish(f"{cage.name} Mesh Cache"))
 
 
-def _paths(cage: bpy.types.Object, path: str, skins: list[bpy.types.Object]) -> list[Path]:
+def _paths(cage: bpy.types.Object, path: str, skins: list[Skin]) -> list[Path]:
     """The file of each skin: `path` itself where there is one skin, else with the skin's name added."""
     whole = files.target(path, cage.name, SUFFIXES)
     if len(skins) == 1:
         return [whole]
     found: list[Path] = []
     for skin in skins:
-        name = f"{whole.stem}-{bpy.path.clean_name(skin.name)}"
+        name = f"{whole.stem}-{bpy.path.clean_name(skin.obj.name)}"
         taken = sum(other.stem.lower().startswith(name.lower()) for other in found)
         found.append(whole.with_name(f"{name}{f'-{taken + 1}' if taken else ''}{whole.suffix}"))
     return found
 
 
-def _player(made: Draft, skin: bpy.types.Object, file: Path, start: int, samples: int) -> None:
+def _player(made: Draft, skin: Skin, file: Path, start: int, samples: int) -> None:
     """A copy of the skin that plays the file by a Mesh Cache modifier where ours is."""
-    obj, place = made.copy_skin(skin, f"{skin.name} Mesh Cache")
+    obj, place = made.copy_skin(skin, f"{skin.obj.name} Mesh Cache")
     obj.shape_key_clear()  # the points have them
     mod = obj.modifiers.new("Mesh Cache", "MESH_CACHE")
     mod.cache_format, mod.filepath = "PC2", _relative(file)

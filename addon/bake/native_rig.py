@@ -17,12 +17,11 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from .. import health, sync
-from ..adapters import armature, positions, shape_keys, snapshot, vertex_groups
+from ..adapters import armature, positions, shape_keys, vertex_groups
 from . import solving
 from .drafts import Draft, draft
 from .keys import Keys
-from .live import BakeError, Steps, playing, refuse_unready, times
+from .live import BakeError, Steps, playing, refuse_unready, rigs, times
 from .recording import Recording, SkinRecord
 
 Array = NDArray[np.float64]
@@ -64,10 +63,11 @@ def steps(
 ) -> Steps[NativeRig]:
     """See `to_native_rig`."""
     refuse_unready(cage)
-    if shape_keys.is_animated(cage):
+    animated = next((rig for rig in rigs(cage) if shape_keys.is_animated(rig)), None)
+    if animated is not None:
         raise BakeError(
-            f"The rest cage '{cage.name}' is animated, so its joints have no one place; remove its keys, drivers and "
-            "modifiers, or apply them, or bake to shape keys, Alembic or USD"
+            f"The rest cage '{animated.name}' is animated, so its joints have no one place; remove its keys, drivers "
+            "and modifiers, or apply them, or bake to shape keys, Alembic or USD"
         )
     at = times(frame_start, frame_end, samples=samples)
     with draft() as made, playing(cage, at[0]) as go:
@@ -75,28 +75,27 @@ def steps(
         for index, time in enumerate(at):
             seen.add(go(time), time)
             yield 0.4 * (index + 1) / len(at)
-        bones = _copy_armature(made, cage, seen, keep_action=keep_action)
+        bones = _copy_armature(made, seen, keep_action=keep_action)
         if not keep_action:
-            yield from (0.4 + 0.2 * share for share in _key_bones(made, cage, bones, seen))
-        natives = [_copy_skin(made, cage, skin, bones, seen) for skin in seen.skins]
+            yield from (0.4 + 0.2 * share for share in _key_bones(made, bones, seen))
+        natives = [_copy_skin(made, skin, bones, seen) for skin in seen.skins]
         collection = made.finish(f"{cage.name} Native")
         with _alone(natives):
             worst = (0.0, at[0], "")
             for index, time in enumerate(at):
-                worst = max(worst, _difference(cage, natives, go(time), time))
+                worst = max(worst, _difference(seen, natives, go(time), time))
                 _refuse_far(*worst, keep_action=keep_action)
                 yield 0.6 + 0.4 * (index + 1) / len(at)
         return NativeRig(collection, bones, natives, *worst)
 
 
-def _copy_armature(made: Draft, cage: bpy.types.Object, seen: Recording, *, keep_action: bool) -> bpy.types.Object:
+def _copy_armature(made: Draft, seen: Recording, *, keep_action: bool) -> bpy.types.Object:
     """The armature with its rest bones at the refit joints, without constraints unless it plays its own action."""
     source = seen.source
-    joints = {joint.name: place for joint, place in zip(cage.cage_rig.joints, seen.joints, strict=True)}
     rest = armature.read_rest(source.data)
     heads = dict(zip(rest.names, rest.heads, strict=True))
-    size = sync.session_of(cage).size
-    moved = {name: place for name, place in joints.items() if np.linalg.norm(place - heads[name]) > 1e-6 * size}
+    joints = {name: joint for name, (joint, _) in seen.refit().items()}
+    moved = {name: joint for name, joint in joints.items() if np.linalg.norm(joint - heads[name]) > 1e-6 * seen.size}
     heads |= moved
     if keep_action:
         keyed = armature.keyed_location(source, armature.leaves_parent(source.data, heads)) if moved else None
@@ -118,19 +117,18 @@ def _copy_armature(made: Draft, cage: bpy.types.Object, seen: Recording, *, keep
     return obj
 
 
-def _key_bones(made: Draft, cage: bpy.types.Object, obj: bpy.types.Object, seen: Recording) -> Iterator[float]:
+def _key_bones(made: Draft, obj: bpy.types.Object, seen: Recording) -> Iterator[float]:
     """Pose the copied armature at every time, by keys; yields its progress."""
-    size = sync.session_of(cage).size
-    place = {joint.name: k for k, joint in enumerate(cage.cage_rig.joints)}
+    refit, weighted = seen.refit(), seen.weighted
     pose = {bone.name: k for k, bone in enumerate(seen.source.pose.bones)}
-    reach = _reach(cage, seen, obj)
+    reach = _reach(seen, obj)
     solved: dict[str, solving.Solved] = {}
     names = armature.bone_names(obj.data)  # parents come before their children
     for index, name in enumerate(names):
         bone = obj.data.bones[name]
-        if name in place:
+        if name in refit:
             rest = armature.to_array(bone.matrix_local)
-            wanted = [Matrix(transforms[place[name]] @ rest) for transforms in seen.transforms]
+            wanted = [Matrix(transform @ rest) for transform in refit[name][1]]
         else:  # a bone made after the bind, which no cage moves
             wanted = [Matrix(poses[pose[name]]) for poses in seen.poses]
         solved[name] = solving.solve(
@@ -140,9 +138,9 @@ def _key_bones(made: Draft, cage: bpy.types.Object, obj: bpy.types.Object, seen:
                 solved[bone.parent.name].posed if bone.parent else None,
                 np.array([channels[pose[name]] for channels in seen.channels]),
                 reach[name],
-                name in place and cage.cage_rig.joints[place[name]].weighted,
+                name in weighted,
             ),
-            SOLVED * size,
+            SOLVED * seen.size,
         )
         yield (index + 1) / len(names)
     armature.disconnect(obj, bpy.context, [name for name, found in solved.items() if not found.connected])
@@ -159,10 +157,9 @@ def _key_bone(keys: Keys, bone: bpy.types.PoseBone, at: list[float], values: Arr
     _key(keys, bone, f"{bone.path_from_id()}.", at, values)
 
 
-def _reach(cage: bpy.types.Object, seen: Recording, obj: bpy.types.Object) -> dict[str, Array]:
+def _reach(seen: Recording, obj: bpy.types.Object) -> dict[str, Array]:
     """Points that each bone moves, `#points by 4` in its own space: a frame of its length, the box of its vertices."""
-    found = {}
-    boxes = _boxes(cage, seen)
+    found, boxes = {}, _boxes(seen)
     for bone in obj.data.bones:
         reach = np.vstack([np.zeros(3), np.eye(3) * bone.length])
         if bone.name in boxes:
@@ -174,20 +171,19 @@ def _reach(cage: bpy.types.Object, seen: Recording, obj: bpy.types.Object) -> di
     return found
 
 
-def _boxes(cage: bpy.types.Object, seen: Recording) -> dict[str, tuple[Array, Array]]:
+def _boxes(seen: Recording) -> dict[str, tuple[Array, Array]]:
     """Low and high corner of the rest vertices that each bone moves, in the armature's space."""
-    settings, found = cage.cage_rig, {}
+    found: dict[str, tuple[Array, Array]] = {}
     for skin in seen.skins:
         points = positions.apply_matrix(skin.to_rig[0], skin.base)
-        indptr, columns, _ = snapshot.read_weights(settings.skins[skin.index].snapshot)
+        names, (indptr, columns, _) = skin.weights
         row = np.repeat(np.arange(len(points)), np.diff(indptr))
         for column in np.unique(columns).tolist():
             moved = points[row[columns == column]]
             low, high = moved.min(axis=0), moved.max(axis=0)
-            name = settings.joints[column].name
-            if name in found:
-                low, high = np.minimum(low, found[name][0]), np.maximum(high, found[name][1])
-            found[name] = low, high
+            if names[column] in found:
+                low, high = np.minimum(low, found[names[column]][0]), np.maximum(high, found[names[column]][1])
+            found[names[column]] = low, high
     return found
 
 
@@ -213,13 +209,11 @@ def _key(keys: Keys, owner: bpy.types.bpy_struct, prefix: str, at: list[float], 
             keys.add(f"{prefix}{path}", k, at[:count], part[:count, k])
 
 
-def _copy_skin(
-    made: Draft, cage: bpy.types.Object, skin: SkinRecord, bones: bpy.types.Object, seen: Recording
-) -> bpy.types.Object:
+def _copy_skin(made: Draft, skin: SkinRecord, bones: bpy.types.Object, seen: Recording) -> bpy.types.Object:
     """The skin in the rest shape that the cage gives it, with the weights of the bind, on the copied armature."""
-    obj, place = made.copy_skin(skin.obj, f"{skin.obj.name} Native")
+    obj, place = made.copy_skin(skin.skin, f"{skin.skin.obj.name} Native")
     _set_rest(obj, skin, seen.times, made)
-    _weigh(obj, cage, skin, bones)
+    _weigh(obj, skin, bones, seen.weighted)
     _place(obj, skin, seen, bones, made)
     mod = obj.modifiers.new(ARMATURE, "ARMATURE")
     mod.object, mod.use_vertex_groups, mod.use_bone_envelopes = bones, True, False
@@ -247,20 +241,20 @@ def _set_rest(obj: bpy.types.Object, skin: SkinRecord, at: list[float], made: Dr
     positions.write_base(mesh, skin.base)
 
 
-def _weigh(obj: bpy.types.Object, cage: bpy.types.Object, skin: SkinRecord, bones: bpy.types.Object) -> None:
-    """Vertex groups as bound; bones that moved nothing then move nothing now."""
-    settings = cage.cage_rig
-    weighted = {joint.name for joint in settings.joints if joint.weighted}
-    for group in obj.vertex_groups:
+def _weigh(obj: bpy.types.Object, skin: SkinRecord, bones: bpy.types.Object, weighted: set[str]) -> None:
+    """Vertex groups as bound. Other groups with a bone's name, which exporters take for weights, go where they can."""
+    asked_for = vertex_groups.named(obj)
+    for group in list(obj.vertex_groups):
         bone = bones.data.bones.get(group.name)
-        if bone is not None and group.name not in weighted:
+        if bone is None:
+            continue
+        if group.name not in weighted:
             bone.use_deform = False
+        if group.name in weighted or group.name not in asked_for:
+            obj.vertex_groups.remove(group)
     for name in weighted:
         bones.data.bones[name].use_deform = True
-        if name in obj.vertex_groups:  # as painted since
-            obj.vertex_groups.remove(obj.vertex_groups[name])
-    weights = snapshot.read_weights(settings.skins[skin.index].snapshot)
-    vertex_groups.write_weights(obj, [joint.name for joint in settings.joints], weights)
+    vertex_groups.write_weights(obj, *skin.weights)
 
 
 def _place(obj: bpy.types.Object, skin: SkinRecord, seen: Recording, bones: bpy.types.Object, made: Draft) -> None:
@@ -308,21 +302,21 @@ def _alone(natives: list[bpy.types.Object]) -> Iterator[None]:
 
 
 def _difference(
-    cage: bpy.types.Object, natives: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, time: float
+    seen: Recording, natives: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, time: float
 ) -> tuple[float, float, str]:
     """How far the new skins are from the live ones now, as a share of the character's size, and the bone there."""
-    settings, session = cage.cage_rig, sync.session_of(cage)
-    to_rig = np.linalg.inv(armature.to_array(settings.armature.evaluated_get(depsgraph).matrix_world))
+    to_rig = np.linalg.inv(armature.to_array(seen.source.evaluated_get(depsgraph).matrix_world))
     worst = (0.0, time, "")
-    for (index, _), obj in zip(health.live_skins(cage), natives, strict=True):
+    for skin, obj in zip(seen.skins, natives, strict=True):
         placed = to_rig @ armature.to_array(obj.evaluated_get(depsgraph).matrix_world)
         native = positions.apply_matrix(placed, positions.read_evaluated(obj, depsgraph))
-        off = np.linalg.norm(native - session.posed_skin(index), axis=1) / session.size
+        live = skin.skin.session.posed_skin(skin.skin.index)
+        off = np.linalg.norm(native - live, axis=1) / seen.size
         vertex = int(off.argmax())
-        indptr, columns, values = snapshot.read_weights(settings.skins[index].snapshot)
+        names, (indptr, columns, values) = skin.weights
         mine = slice(indptr[vertex], indptr[vertex + 1])
-        heaviest = columns[mine][values[mine].argmax()] if len(columns[mine]) else -1
-        worst = max(worst, (float(off[vertex]), time, settings.joints[heaviest].name if heaviest >= 0 else ""))
+        bone = names[columns[mine][values[mine].argmax()]] if len(columns[mine]) else ""
+        worst = max(worst, (float(off[vertex]), time, bone))
     return worst
 
 

@@ -17,7 +17,7 @@ import bpy
 from .. import compat
 from . import files
 from .drafts import draft
-from .live import BakeError, Steps, live_skins, playing, refuse_unready, times
+from .live import BakeError, Steps, playing, refuse_paused, refuse_unready, skins_of, times
 
 ALEMBIC = (".abc",)
 USD = (".usdc", ".usd", ".usda")
@@ -117,12 +117,12 @@ def _steps(
     refuse_unready(cage)
     target = files.target(path, cage.name, suffixes)
     yield 0.0
-    skins = live_skins(cage)
+    skins = [skin.obj for skin in skins_of(cage)]
     with files.written([target]) as (file,), playing(cage, frames[0]), _selected(skins):
         with _watched(cage, frames) as troubles:
             _call(write, file, f"'{target.name}' can't be written")
         if troubles:
-            raise BakeError(troubles[0])
+            raise troubles[0]
         if file.stat().st_size == 0:
             raise BakeError(f"'{target.name}' can't be written: Blender's exporter made nothing")
         yield 1.0
@@ -185,13 +185,15 @@ def _scene_range(start: int, end: int) -> Iterator[None]:
 
 
 @contextmanager
-def _watched(cage: bpy.types.Object, frames: tuple[int, int]) -> Iterator[list[str]]:
+def _watched(cage: bpy.types.Object, frames: tuple[int, int]) -> Iterator[list[BakeError]]:
     """Yields what keeps the rig from being live at frames that Blender goes through, and tells how far it is."""
-    troubles: list[str] = []
+    troubles: list[BakeError] = []
 
     def watch(scene: bpy.types.Scene, *_: object) -> None:
-        if cage.cage_rig.state != "LIVE":
-            troubles.append(f"'{cage.name}' is paused at frame {scene.frame_current}: {cage.cage_rig.message}")
+        try:
+            refuse_paused(cage, scene.frame_current_final)
+        except BakeError as error:
+            troubles.append(error)
         share = (scene.frame_current - frames[0]) / max(frames[1] - frames[0], 1)
         bpy.context.window_manager.progress_update(100.0 * min(max(share, 0.0), 1.0))
 

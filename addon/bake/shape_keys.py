@@ -14,7 +14,7 @@ import bpy
 from ..adapters import shape_keys
 from .drafts import Draft, draft
 from .keys import Keys
-from .live import Steps, live_skins, playing, posed_skins, refuse_unready, times
+from .live import Skin, Steps, playing, posed_skins, refuse_unready, skins_of, times
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def steps(cage: bpy.types.Object, frame_start: int, frame_end: int, *, step: int
     refuse_unready(cage)
     at = times(frame_start, frame_end, step=step)
     with draft() as made:
-        copies = [_copy(made, skin) for skin in live_skins(cage)]
+        copies = [_copy(made, skin) for skin in skins_of(cage)]
         with playing(cage, at[0]) as go:
             for index, time in enumerate(at):
                 for obj, points in zip(copies, posed_skins(cage, go(time)), strict=True):
@@ -49,8 +49,8 @@ def steps(cage: bpy.types.Object, frame_start: int, frame_end: int, *, step: int
         return KeyedShapes(made.finish(f"{cage.name} Shape Keys"), copies, len(at))
 
 
-def _copy(made: Draft, skin: bpy.types.Object) -> bpy.types.Object:
-    obj, _ = made.copy_skin(skin, f"{skin.name} Shape Keys")
+def _copy(made: Draft, skin: Skin) -> bpy.types.Object:
+    obj, _ = made.copy_skin(skin, f"{skin.obj.name} Shape Keys")
     obj.shape_key_clear()  # the baked points have them
     obj.shape_key_add(name="Basis", from_mix=False)
     return obj
