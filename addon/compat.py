@@ -27,16 +27,46 @@ def modifier_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
 
 
 def action_curves(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
-    """The curves of the action (and its slot) that animates `owner`: `action.fcurves` is gone in 5.0."""
+    """The curves of the action (and its slot, from 4.4 on) that animates `owner`: `action.fcurves` is gone in 5.0."""
     data = owner.animation_data
     if data is None or data.action is None:
         return []
-    if hasattr(data.action, "fcurves"):
+    if not hasattr(data.action, "slots"):
         return list(data.action.fcurves)
     slot = data.action_slot
     strips = [strip for layer in data.action.layers for strip in layer.strips]
     bags = [strip.channelbag(slot) for strip in strips] if slot is not None else []
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
+
+
+def ensure_curves(owner: bpy.types.ID, name: str) -> Any:
+    """Where the curves of `owner`'s action are (`.fcurves`, `.groups`); an action `name` is made where there is none.
+
+    A linked action is replaced by a copy of this file's, which can be edited.
+    """
+    data = owner.animation_data
+    if data is None or data.action is None:
+        return new_action(owner, name)
+    if data.action.library is not None:
+        slot_name = data.action_slot.identifier if getattr(data, "action_slot", None) else None
+        data.action = data.action.copy()
+        if slot_name is not None:
+            data.action_slot = data.action.slots[slot_name]
+    action = data.action
+    if not hasattr(action, "slots"):
+        return action
+    if data.action_slot is None:
+        data.action_slot = action.slots.new(owner.id_type, owner.name)
+    layer = action.layers[0] if action.layers else action.layers.new("Layer")
+    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    return strip.channelbag(data.action_slot, ensure=True)
+
+
+def new_curve(container: Any, path: str, group: str) -> bpy.types.FCurve:
+    """A new curve for `path` in what `ensure_curves` gave, in a group of channels."""
+    curve = container.fcurves.new(path)
+    curve.group = container.groups.get(group) or container.groups.new(group)
+    return curve
 
 
 def new_action(owner: bpy.types.ID, name: str) -> Any:

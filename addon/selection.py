@@ -21,6 +21,18 @@ def poll_rig(operator: type[bpy.types.Operator], context: bpy.types.Context) -> 
     return True
 
 
+def poll_live(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Poll of operators that work on the active object's live rig, in any mode."""
+    cage = rig_of(context.object)
+    if cage is None:
+        operator.poll_message_set("Select the cage, a skin or the armature of a rig")
+        return False
+    if cage.cage_rig.state != "LIVE":
+        operator.poll_message_set("The rig is paused: " + cage.cage_rig.message)
+        return False
+    return True
+
+
 def to_bind(
     context: bpy.types.Context,
 ) -> tuple[bpy.types.Object, bpy.types.Object, list[bpy.types.Object]]:

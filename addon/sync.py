@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import health, layers, linked, registry, skins
-from .adapters import armature, modifier, positions, shape_keys, snapshot, stack
+from .adapters import armature, cage_keys, modifier, positions, shape_keys, snapshot, stack
 from .session import Below, Session, SessionCrash, SessionError, SkinSnapshot, Snapshot
 
 Points = NDArray[np.float32]
@@ -107,6 +107,12 @@ def start(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, session: Sessi
     """After a bind: show the rig, which runs in the session that the bind computed."""
     drop(cage)
     _running[cage.session_uid] = _Running(session, cage.cage_rig.bind_id)
+    update(cage, depsgraph, Event.RESTORED)
+
+
+def refresh(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """After an operator changed the rest cage: what is there is the truth, and no edit of the posed cage."""
+    registry.forget()
     update(cage, depsgraph, Event.RESTORED)
 
 
@@ -289,9 +295,11 @@ def _posed_is_edit(cage: bpy.types.Object, event: Event, rest_changed: bool) -> 
 
 def _take_posed_edit(cage: bpy.types.Object, running: _Running, posed: Points) -> str:
     """The artist moved the posed cage: move the rest cage so that it goes there, or say why that can't be."""
+    keyed = not cage.data.is_editmode and cage_keys.takes_edits(cage)
     try:
         if not cage.data.is_editmode:
-            shape_keys.key_share(cage)
+            if not keyed:
+                shape_keys.key_share(cage)
             _refuse_deformed_cage(cage)
         wanted = running.session.edit_posed_cage(posed)
     except (shape_keys.KeyRefusal, SessionError) as error:
@@ -303,6 +311,14 @@ def _take_posed_edit(cage: bpy.types.Object, running: _Running, posed: Points) -
     _move_rest_cage(cage, before, wanted)
     running.cage_wanted = wanted.astype(np.float32)
     return ""
+
+
+def _choose_key(cage: bpy.types.Object) -> None:
+    """Where the rest cage is keyed, an edit belongs to the key at this frame, or waits to be keyed."""
+    if cage_keys.takes_edits(cage):
+        scene = bpy.context.scene
+        auto = scene.tool_settings.use_keyframe_insert_auto
+        cage_keys.activate(cage, scene.frame_current_final, auto=auto)
 
 
 def _refuse_deformed_cage(cage: bpy.types.Object) -> None:
@@ -321,6 +337,7 @@ def _move_rest_cage(cage: bpy.types.Object, before: Points, wanted: Matrix) -> N
     if cage.data.is_editmode:
         positions.write_edit_mesh(cage.data, positions.apply_matrix(from_rig, wanted))
     else:
+        _choose_key(cage)
         delta = (wanted - before) @ from_rig[:3, :3].T
         shape_keys.move(cage, delta.astype(np.float32))
 

@@ -30,14 +30,15 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"bpy", "mathutils", "numpy", "pathlib", "struct"},
         {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
     ),
+    "keying": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "sync"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),
-    "operators": ({"bpy"}, {"bake", "lifecycle", "operators", "props", "selection"}),
+    "operators": ({"bpy"}, {"bake", "keying", "lifecycle", "operators", "props", "selection"}),
     "ui": ({"bpy"}, {"props", "ui"}),
     "__init__": (set(), {"handlers", "operators", "props", "ui"}),
 }
 STANDARD = {"__future__", "atexit", "collections", "contextlib", "dataclasses", "enum", "functools", "itertools"}
-STANDARD |= {"math", "textwrap", "typing", "uuid"}
+STANDARD |= {"math", "re", "textwrap", "typing", "uuid"}
 
 
 def layer_of(path: Path) -> str:

@@ -8,6 +8,11 @@ import bpy
 from .apply_refit import CAGE_RIG_OT_apply_refit
 from .bake import CAGE_RIG_OT_bake
 from .bind import CAGE_RIG_OT_bind
+from .delete_key import CAGE_RIG_OT_delete_key
+from .discard_edit import CAGE_RIG_OT_discard_edit
+from .jump_to_key import CAGE_RIG_OT_jump_to_key
+from .key_cage import CAGE_RIG_OT_key_cage
+from .key_envelope import CAGE_RIG_OT_key_envelope
 from .rebind import CAGE_RIG_OT_rebind
 from .select_part import CAGE_RIG_OT_select_part
 from .unbind import CAGE_RIG_OT_unbind
@@ -18,6 +23,11 @@ CLASSES = (
     CAGE_RIG_OT_unbind,
     CAGE_RIG_OT_apply_refit,
     CAGE_RIG_OT_bake,
+    CAGE_RIG_OT_key_cage,
+    CAGE_RIG_OT_key_envelope,
+    CAGE_RIG_OT_delete_key,
+    CAGE_RIG_OT_discard_edit,
+    CAGE_RIG_OT_jump_to_key,
     CAGE_RIG_OT_select_part,
 )
 

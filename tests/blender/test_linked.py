@@ -196,6 +196,31 @@ def test_a_change_of_the_library_reaches_the_shot(keyed: tuple[str, dict[int, Po
     assert differ(frames(rig), truth) < 1e-5
 
 
+def test_the_cage_of_an_overridden_character_is_keyed_in_the_shot(
+    keyed: tuple[str, dict[int, Points]], tmp_path: Path
+) -> None:
+    path, truth = keyed
+    one, other = override(path), override(path)
+    bpy.context.scene.frame_set(9)
+    select([one.cage], one.cage)
+    assert bpy.ops.cage_rig.key_cage() == {"FINISHED"}
+    bpy.context.scene.frame_set(20)
+    enter_edit_mode(one.posed)
+    drag(one.posed, 3, (0.4, 0.5, 0.3))
+    leave_edit_mode()
+    select([one.cage], one.cage)
+    assert bpy.ops.cage_rig.key_cage() == {"FINISHED"}
+    shapes = frames(one)
+    assert np.abs(shapes[9] - truth[9]).max() < 1e-5 and np.abs(shapes[20] - truth[20]).max() > 0.1
+    assert differ(frames(other), truth) < 1e-6, "the other one plays the library's keys"
+    names = one.cage.name, other.cage.name
+    shot = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=shot)
+    bpy.ops.wm.open_mainfile(filepath=shot)
+    one, other = (as_rig(bpy.data.objects[name]) for name in names)
+    assert differ(frames(one), shapes) < 1e-5 and differ(frames(other), truth) < 1e-6
+
+
 def test_what_was_bound_elsewhere_is_not_taken_apart_here(keyed: tuple[str, dict[int, Points]]) -> None:
     path, truth = keyed
     rig = override(path)
