@@ -13,7 +13,9 @@ from mathutils.kdtree import KDTree
 from scene import Rig, select
 
 TIMES = (1, 7, 13, 20, 25)
-KINDS = pytest.mark.parametrize("kind", ["gltf", "fbx"])
+# With Blender's own glTF add-on alone the bpy module of 4.2 crashes when the process ends.
+CRASHES = pytest.mark.skipif(bpy.app.version < (4, 3), reason="bpy 4.2 crashes at exit once its glTF add-on has run")
+KINDS = pytest.mark.parametrize("kind", [pytest.param("gltf", marks=CRASHES), "fbx"])
 
 
 def there_and_back(kind: str, objects: list[bpy.types.Object], folder: Path) -> tuple[list[bpy.types.Object], int]:
