@@ -16,7 +16,7 @@ import bpy
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from blend_fixtures import build, rigs, small
+from blend_fixtures import build, corrections, rigs, small
 
 FIXTURES: dict[str, Callable[[], build.RigObjects]] = {
     "biped": build.build_biped,
@@ -25,6 +25,7 @@ FIXTURES: dict[str, Callable[[], build.RigObjects]] = {
     "simple_bar": lambda: build.build_character(small.simple_bar()),
     "two_skins": lambda: build.build_character(small.two_skins()),
     "two_roots": lambda: build.build_character(small.two_roots()),
+    **corrections.CORRECTIONS,
     **{name: partial(rigs.build_rig, name) for name in rigs.RIGS},
 }
 

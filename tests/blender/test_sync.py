@@ -312,6 +312,7 @@ def assert_rendered(rig: Rig, truth: dict[int, np.ndarray], folder: Path) -> Non
         mesh = rig.skin.data.copy()
         mesh.attributes["position"].data.foreach_set("vector", truth[frame].ravel())
         still = bpy.data.objects.new("Still", mesh)
+        still.parent, still.matrix_local = rig.skin.parent, rig.skin.matrix_local
         scene.collection.objects.link(still)
         assert np.abs(silhouettes(folder)[k] - live[k]).sum() < 0.5, f"render of frame {frame}"
         bpy.data.objects.remove(still)

@@ -51,15 +51,9 @@ impl Fixture {
     }
 }
 
-/// Every fixture of the project's own.
+/// Every fixture of the project's own whose cage encloses the whole skin.
 pub fn all() -> Vec<Fixture> {
-    vec![
-        shapes::bar(),
-        shapes::blob(),
-        shapes::more_cage_than_skin(),
-        shapes::far_vertex(),
-        shapes::partly_caged(),
-    ]
+    vec![shapes::bar(), shapes::blob(), shapes::more_cage_than_skin(), shapes::far_vertex()]
 }
 
 /// Rotation about `axis` by `angle` that keeps `pivot` in place.
