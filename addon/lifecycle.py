@@ -6,15 +6,15 @@ from __future__ import annotations
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import health, layers, props, sync
+from . import binding, health, layers, props, sync
 from .adapters import armature, modifier, positions, shape_keys, snapshot, stack, vertex_groups
-from .session import Session, SessionError, SkinSnapshot, Snapshot
+from .session import Known, Session, SessionError, SkinSnapshot, Snapshot
 
 Matrix = NDArray[np.float64]
 
@@ -38,18 +38,23 @@ def bind(
     cage: bpy.types.Object,
     armature_object: bpy.types.Object,
     skins: list[bpy.types.Object],
+    *,
+    known: Known | None = None,
+    source: str = "",
 ) -> None:
     """Bind skins, armature and cage into a rig that is live from now on. Object Mode.
 
-    Where another rig of this armature deforms one of the skins already, the new one stands on it. Raises `BindError`,
-    with nothing changed, where it can't be bound.
+    Where another rig of this armature deforms one of the skins already, the new one stands on it. What is `known`, from
+    a `source` that the artist is told, is not computed. Raises `BindError`, with nothing changed, where it can't be.
     """
     _refuse_cage(cage)
     lower = _rig_below(armature_object, skins)
     bound = _read(context, cage, armature_object, skins)
+    bound = replace(bound, snapshot=replace(bound.snapshot, known=known or Known()))
     session = _compute(cage, bound)
     settings = cage.cage_rig
     settings.version, settings.armature, settings.input = props.VERSION, armature_object, lower
+    settings.coordinates = source
     if lower is not None:
         settings.method = lower.cage_rig.method
     elif all(stack.preserves_volume(obj, armature_object) for obj in skins):
@@ -63,10 +68,11 @@ def bind(
         raise
 
 
-def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> None:
+def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> str:
     """Take the present meshes, weights and rest bones as the new rest; keep keys and settings. Object Mode.
 
-    Skins that were deleted are forgotten. Raises `BindError`, with nothing changed, where it can't be.
+    Skins that were deleted are forgotten. Coordinates that were loaded stay while the rest shape is what they were
+    loaded for; returns a sentence on those that did not. Raises `BindError`, with nothing changed, where it can't be.
     """
     settings = cage.cage_rig
     _refuse_override(cage)
@@ -77,13 +83,50 @@ def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> None:
     skins = [skin.object for skin in settings.skins if skin.object is not None and skin.object.users_collection]
     if not skins:
         raise BindError(f"All skins of '{cage.name}' were deleted; undo, or Unbind")
-    bound = _read(context, cage, settings.armature, skins)
+    bound, before = _read(context, cage, settings.armature, skins), settings.coordinates
+    fits = bool(before) and _same_rest(cage, bound)
+    if fits:
+        bound = replace(bound, snapshot=replace(bound.snapshot, known=binding.read(cage).known))
     session = _compute(cage, bound)
     for index in reversed(range(len(settings.skins))):
         if settings.skins[index].object not in skins:
             _remove_mesh(settings.skins[index].snapshot)
             settings.skins.remove(index)
+    settings.coordinates = before if fits else ""
     _install(context, cage, bound, session)
+    if fits or not before:
+        return ""
+    return f"The rest shape has changed, so the coordinates of '{before}' were dropped and computed anew"
+
+
+def use_coordinates(context: bpy.types.Context, cage: bpy.types.Object, known: Known, source: str) -> None:
+    """Let the rig use coordinates for its bind that were computed elsewhere (`Known()`: its own), at once.
+
+    `source` is what the artist is told of them. Raises `BindError`, with nothing changed, where it can't.
+    """
+    settings = cage.cage_rig
+    _refuse_override(cage)
+    if settings.snapshot is None or any(skin.snapshot is None for skin in settings.skins):
+        raise BindError(f"What was bound of '{cage.name}' is lost; press Rebind")
+    try:
+        session = Session(replace(binding.read(cage), known=known))
+    except SessionError as error:
+        raise BindError(f"'{cage.name}' can't use these coordinates: {error}") from error
+    binding.write_known(cage, known)
+    settings.coordinates, settings.bind_id = source, uuid.uuid4().hex
+    sync.start(cage, context.evaluated_depsgraph_get(), session)
+
+
+def _same_rest(cage: bpy.types.Object, bound: _Bound) -> bool:
+    """Whether skins, joints and cage rest where they did when the rig was bound."""
+    settings, now = cage.cage_rig, bound.snapshot
+    if any(skin.snapshot is None for skin in settings.skins) or settings.snapshot is None:
+        return False
+    then = binding.read(cage)
+    pairs = [(then.cage, now.cage), (then.heads, now.heads), (then.parents, now.parents)]
+    pairs += [(one.points, other.points) for one, other in zip(then.skins, now.skins, strict=False)]
+    same = len(then.skins) == len(now.skins) and [joint.name for joint in settings.joints] == bound.bone_names
+    return same and all(np.array_equal(one, other) for one, other in pairs)
 
 
 def unbind(cage: bpy.types.Object) -> None:
@@ -329,6 +372,7 @@ def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound, 
         skin.snapshot = snapshot.write(f"{skin.object.name} Bind", part.points, part.faces, part.weights)
         skin.skin_to_rig = bound.skin_to_rig[index].T.tolist()
         _join(skin.object, cage)
+    binding.write_known(cage, bound.snapshot.known)
     settings.state = "PAUSED"  # a rig until the first update makes it live
     sync.start(cage, context.evaluated_depsgraph_get(), session)
 

@@ -126,6 +126,11 @@ class CageRigSettings(bpy.types.PropertyGroup):
     joints: CollectionProperty(type=CageRigJoint, name="Joints", override=OVERRIDABLE | {"USE_INSERTION"})
     snapshot: PointerProperty(type=bpy.types.Mesh, name="Cage at Bind", override=OVERRIDABLE)
     bind_id: StringProperty(name="Bind", description="Which bind the snapshots are of", override=OVERRIDABLE)
+    coordinates: StringProperty(
+        name="Coordinates",
+        description="Where the rig's coordinates were loaded from; empty: they are computed from the bind",
+        override=OVERRIDABLE,
+    )
     cage_to_rig: FloatVectorProperty(name="Cage to Rig", subtype="MATRIX", size=(4, 4), override=OVERRIDABLE)
 
     # Marks on participants. `owner` is the rest cage they belong to.

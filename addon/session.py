@@ -19,6 +19,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Points = NDArray[np.float32]
 Mask = NDArray[np.float32]
+Faces = tuple[NDArray[np.int32], NDArray[np.int32]]
 Matrices = NDArray[np.float64]
 
 
@@ -55,6 +56,16 @@ class SkinSnapshot:
 
 
 @dataclass(frozen=True)
+class Known:
+    """What was computed elsewhere, over all skins; None: the bind computes it. float32, which is what a file keeps."""
+
+    cage_coords: NDArray[np.float32] | None = None  # Φ, #M by #C
+    joint_coords: NDArray[np.float32] | None = None  # Ψ, #J by #C
+    center_coords: NDArray[np.float32] | None = None  # Λ, #M by #C
+    anchors: NDArray[np.int32] | None = None  # #C vertices (#M where there are fewer)
+
+
+@dataclass(frozen=True)
 class Snapshot:
     """Everything a rig is computed from, in rig space."""
 
@@ -65,6 +76,7 @@ class Snapshot:
     cage: Points  # #C by 3
     cage_faces: tuple[NDArray[np.int32], NDArray[np.int32]]
     method: str
+    known: Known = Known()
 
 
 @dataclass(frozen=True)
@@ -94,6 +106,7 @@ class Session:
             snapshot.cage,
             snapshot.cage_faces,
             method=snapshot.method,
+            **vars(snapshot.known),
         )
         self.influence = 1.0
         self.revision = 0  # grows whenever a result may have changed
@@ -116,6 +129,11 @@ class Session:
     def report(self) -> dict[str, Any]:
         """What the bind found; see the core."""
         return dict(self.rig.report)
+
+    @property
+    def coordinates(self) -> dict[str, Any]:
+        """Φ, Ψ, Λ (None until a method needs it) and anchors over all skins, by their names in `Known`."""
+        return {name: getattr(self.rig, name) for name in vars(self.snapshot.known)}
 
     @property
     def joints(self) -> Matrices:
@@ -267,6 +285,12 @@ class Session:
             reach = np.einsum("ij,ij->i", joints[child] - joints[bone], along) / np.maximum(length, 1e-12)
             moved[bone, :3, 1] *= np.clip(reach, 0.05, None)[:, None]
         return self.rig.transforms @ moved
+
+
+@_door
+def mean_value_coordinates(points: Points, cage: Points, cage_faces: Faces) -> Matrices:
+    """The coordinates that a bind computes (`#M by #C`), of `points` with respect to a cage."""
+    return np.asarray(cage_rig_core.mean_value_coordinates(points, cage, cage_faces))
 
 
 def _sum(one: Points | None, other: Points | None) -> Points | None:

@@ -14,9 +14,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import health, layers, linked, registry, skins
-from .adapters import armature, cage_keys, modifier, positions, shape_keys, snapshot, stack
-from .session import Below, Session, SessionCrash, SessionError, SkinSnapshot, Snapshot
+from . import binding, health, layers, linked, registry, skins
+from .adapters import armature, cage_keys, modifier, positions, shape_keys, stack
+from .session import Below, Session, SessionCrash, SessionError
 
 Points = NDArray[np.float32]
 Matrix = NDArray[np.float64]
@@ -166,7 +166,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
         return  # in no view of this depsgraph: nothing of it is shown
     running = _running.get(cage.session_uid)
     if running is None or running.bind_id != cage.cage_rig.bind_id:  # an undo may bring back another bind
-        running = _running[cage.session_uid] = _start(cage)
+        running = _running[cage.session_uid] = _Running(Session(binding.read(cage)), cage.cage_rig.bind_id)
         event = Event.RESTORED
     if event is Event.RESTORED:
         running.written.clear()
@@ -174,33 +174,6 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     note = _advance(cage, running, depsgraph, event)
     _write_back(cage, running, depsgraph)
     _resume(cage, note)
-
-
-def _start(cage: bpy.types.Object) -> _Running:
-    settings = cage.cage_rig
-    parts = [
-        SkinSnapshot(
-            positions.read_base(skin.snapshot),
-            positions.read_faces(skin.snapshot),
-            snapshot.read_weights(skin.snapshot),
-        )
-        for skin in settings.skins
-    ]
-    joints = settings.joints
-    return _Running(
-        Session(
-            Snapshot(
-                parts,
-                np.array([joint.head for joint in joints], np.float64).reshape(-1, 3),
-                np.array([joint.tail for joint in joints], np.float64).reshape(-1, 3),
-                np.array([joint.parent for joint in joints], np.int32),
-                positions.read_base(settings.snapshot),
-                positions.read_faces(settings.snapshot),
-                settings.method.lower(),
-            )
-        ),
-        settings.bind_id,
-    )
 
 
 def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:

@@ -24,16 +24,27 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "registry": ({"bpy"}, {"adapters", "layers"}),
     "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
-    "sync": ({"bpy", "numpy"}, {"adapters", "health", "layers", "linked", "registry", "session", "skins"}),
-    "lifecycle": ({"bpy", "numpy"}, {"adapters", "health", "layers", "props", "session", "sync"}),
+    "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
+    "sync": ({"bpy", "numpy"}, {"adapters", "binding", "health", "layers", "linked", "registry", "session", "skins"}),
+    "lifecycle": ({"bpy", "numpy"}, {"adapters", "binding", "health", "layers", "props", "session", "sync"}),
     "bake": (
         {"bpy", "mathutils", "numpy", "pathlib", "struct"},
         {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
     ),
+    "exchange": ({"numpy", "pathlib", "zipfile"}, {"exchange"}),
+    "exchange/__init__": ({"bpy", "pathlib"}, {"exchange"}),
+    "exchange/live": (
+        {"bpy", "numpy", "pathlib"},
+        {"bake", "binding", "exchange", "lifecycle", "session", "sync"},
+    ),
+    "exchange/scene": (
+        {"bpy", "mathutils", "numpy", "pathlib"},
+        {"adapters", "bake", "exchange", "lifecycle", "session"},
+    ),
     "keying": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "sync"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),
-    "operators": ({"bpy"}, {"bake", "keying", "lifecycle", "operators", "props", "selection"}),
+    "operators": ({"bpy"}, {"bake", "exchange", "keying", "lifecycle", "operators", "props", "selection"}),
     "ui": ({"bpy"}, {"props", "ui"}),
     "__init__": (set(), {"handlers", "operators", "props", "ui"}),
 }
@@ -42,7 +53,9 @@ STANDARD |= {"math", "re", "textwrap", "typing", "uuid"}
 
 
 def layer_of(path: Path) -> str:
-    return path.relative_to(ADDON).parts[0].removesuffix(".py")
+    """Where in `ALLOWED` a file is: by itself, or with its folder."""
+    inside = path.relative_to(ADDON).with_suffix("")
+    return inside.as_posix() if inside.as_posix() in ALLOWED else inside.parts[0]
 
 
 def imports(path: Path) -> tuple[set[str], set[str], list[int]]:

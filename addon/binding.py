@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the file keeps of a rig's bind: everything that its session is made from."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .adapters import coordinates, positions, snapshot
+from .session import Known, SkinSnapshot, Snapshot
+
+
+def read(cage: bpy.types.Object) -> Snapshot:
+    """The bind of a rig, as arrays."""
+    settings = cage.cage_rig
+    parts = [
+        SkinSnapshot(
+            positions.read_base(skin.snapshot),
+            positions.read_faces(skin.snapshot),
+            snapshot.read_weights(skin.snapshot),
+        )
+        for skin in settings.skins
+    ]
+    joints = settings.joints
+    return Snapshot(
+        parts,
+        np.array([joint.head for joint in joints], np.float64).reshape(-1, 3),
+        np.array([joint.tail for joint in joints], np.float64).reshape(-1, 3),
+        np.array([joint.parent for joint in joints], np.int32),
+        positions.read_base(settings.snapshot),
+        positions.read_faces(settings.snapshot),
+        settings.method.lower(),
+        _read_known(settings),
+    )
+
+
+def _read_known(settings: bpy.types.PropertyGroup) -> Known:
+    """Coordinates that were computed elsewhere: on the skins' snapshots, and what belongs to the cage on the cage's."""
+    mesh = settings.snapshot
+    joints = coordinates.read(mesh, "joint_coords", len(settings.joints))
+    return Known(
+        _read_rows(settings, "cage_coords"),
+        None if joints is None else joints.T,
+        _read_rows(settings, "center_coords"),
+        coordinates.read_indices(mesh, "anchors"),
+    )
+
+
+def _read_rows(settings: bpy.types.PropertyGroup, name: str) -> NDArray[np.float32] | None:
+    """Rows of all skins, or None where they are not of all."""
+    columns = len(settings.snapshot.vertices)
+    parts = [coordinates.read(skin.snapshot, name, columns) for skin in settings.skins]
+    return None if any(part is None for part in parts) else np.concatenate(parts)
+
+
+def write_known(cage: bpy.types.Object, known: Known) -> None:
+    """Keep coordinates with the rig's snapshots, instead of those that were kept."""
+    settings, start = cage.cage_rig, 0
+    for skin in settings.skins:
+        end = start + len(skin.snapshot.vertices)
+        for name in ("cage_coords", "center_coords"):
+            rows = getattr(known, name)
+            coordinates.write(skin.snapshot, name, None if rows is None else rows[start:end])
+        start = end
+    joints = known.joint_coords
+    coordinates.write(settings.snapshot, "joint_coords", None if joints is None else joints.T)
+    coordinates.write_indices(settings.snapshot, "anchors", known.anchors)
