@@ -118,10 +118,11 @@ def to_native_rig(
 ) -> NativeRig:
     """Bake a rig with a still rest cage to skins and an armature that Blender's Armature modifier plays alike.
 
-    For the method Linear. Every bone is keyed, `samples` a frame; constraints and drivers are in the keys. With
-    `keep_action` the copy plays the armature's own action instead, which is refused where constraints make that another
-    motion. `error` of the result is the farthest that any vertex is from the live rig at any of the times, as a share
-    of the character's size: around 1e-6; more than 1e-4 is refused.
+    For the methods Linear and, where Blender's Preserve Volume does the same, Dual Quaternion. Every bone is keyed,
+    `samples` a frame; constraints and drivers are in the keys. With `keep_action` the copy plays the armature's own
+    action instead, which is refused where constraints make that another motion. `error` of the result is the farthest
+    that any vertex is from the live rig at any of the times, as a share of the character's size: around 1e-6; more than
+    1e-4 is refused.
     """
     start, end = _range(frame_start, frame_end)
     return run(native_rig.steps(cage, start, end, samples=samples, keep_action=keep_action))

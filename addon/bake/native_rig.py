@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """To a native rig: skins, bones and an action that Blender's own Armature modifier plays as the live rig does.
 
-For a rest cage that stands still: rest skins and rest joints are those that it gives, weights those of the bind. The
-pose is that of the refit transforms T, whatever makes it (constraints, IK, drivers), keyed plainly: T · rest, in what
-each bone's parent hands on to it (`solving`). Then the new rig is played and held against the live one.
+For a rest cage that stands still, and the methods Linear and Dual Quaternion (as Preserve Volume). Rest skins and rest
+joints are those that the cage gives, weights those of the bind. The pose is that of the refit transforms T, whatever
+makes it (constraints, IK, drivers), keyed plainly: T · rest, in what each bone's parent hands on to it (`solving`).
+Then the new rig is played and held against the live one.
 """
 
 from __future__ import annotations
@@ -53,6 +54,8 @@ class NativeRig:
         text = f"Baked '{self.collection.name}', which plays within {self.error:.1e} of the character's size"
         if self.error > 1e-5:
             text += f" (farthest at bone '{self.bone}', frame {self.frame:g})"
+        if any(mod.type == "ARMATURE" and mod.use_deform_preserve_volume for s in self.skins for mod in s.modifiers):
+            text += "; other programs don't know its Preserve Volume and skin it linearly"
         if self.helpers:
             text += f"; {len(self.helpers)} bone(s) are added for what is sheared, as '{self.helpers[0]}'"
         return text
@@ -83,8 +86,9 @@ def steps(
         with _alone(natives):
             worst = (0.0, at[0], "")
             for index, time in enumerate(at):
-                worst = max(worst, _difference(seen, natives, go(time), time))
-                _refuse_far(*worst, keep_action=keep_action)
+                here = _difference(seen, natives, go(time), time)
+                _refuse_far(here, seen, keep_action=keep_action)
+                worst = max(worst, here)
                 yield 0.6 + 0.4 * (index + 1) / len(at)
         return NativeRig(collection, bones, natives, *worst)
 
@@ -217,7 +221,7 @@ def _copy_skin(made: Draft, skin: SkinRecord, bones: bpy.types.Object, seen: Rec
     _place(obj, skin, seen, bones, made)
     mod = obj.modifiers.new(ARMATURE, "ARMATURE")
     mod.object, mod.use_vertex_groups, mod.use_bone_envelopes = bones, True, False
-    mod.use_deform_preserve_volume = False
+    mod.use_deform_preserve_volume = skin.preserves_volume
     obj.modifiers.move(len(obj.modifiers) - 1, place)
     return obj
 
@@ -320,16 +324,15 @@ def _difference(
     return worst
 
 
-def _refuse_far(error: float, time: float, bone: str, *, keep_action: bool) -> None:
+def _refuse_far(found: tuple[float, float, str], seen: Recording, *, keep_action: bool) -> None:
+    error, time, bone = found
     if error <= TOLERANCE:
         return
     off = f"off by {100.0 * error:.2g} % of the character's size at frame {time:g}, at bone '{bone}'"
     if keep_action:
-        raise BakeError(
-            f"With its own action the native rig would be {off}: constraints, IK or drivers make another motion of it "
-            "there; bake a new action"
-        )
-    raise BakeError(
-        f"The native rig would be {off}, whose motion location, rotation and scale can't make; bake to shape keys, "
-        "Alembic or USD"
-    )
+        why = "constraints, IK or drivers make another motion of its own action; bake a new one"
+    elif any(skin.preserves_volume for skin in seen.skins):
+        why = "Blender's Preserve Volume does otherwise with what is scaled there; set the method to Linear"
+    else:
+        why = "location, rotation and scale can't make its motion; bake to shape keys, Alembic or USD"
+    raise BakeError(f"The native rig would be {off}: {why}")

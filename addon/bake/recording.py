@@ -34,6 +34,11 @@ class SkinRecord:
         return bool(np.ptp(self.to_rig, axis=0).max() <= tolerance)
 
     @property
+    def preserves_volume(self) -> bool:
+        """Whether it is posed by dual quaternions, which Blender's modifier calls Preserve Volume."""
+        return self.skin.session.rig.method == "dqs"
+
+    @property
     def weights(self) -> tuple[list[str], snapshot.Csr]:
         """Names of bones, and the weights of the bind, whose columns they are."""
         settings = self.skin.cage.cage_rig
@@ -49,6 +54,7 @@ class RigRecord:
     cage: bpy.types.Object
     joints: Array
     influence: float
+    method: str  # "lbs" or "dqs"
     transforms: list[Array] = field(default_factory=list)  # a time: #J by 4 by 4
 
 
@@ -102,15 +108,18 @@ class Recording:
 
     def _add_rig(self, place: int, cage: bpy.types.Object, time: float) -> None:
         session = sync.session_of(cage)
-        if session.rig.method != "lbs":
+        method = session.rig.method
+        if method not in ("lbs", "dqs"):
             raise BakeError(
-                f"'{cage.name}' skins by another method than Linear, which an exported rig can't; "
-                "set its method to Linear, or bake to shape keys, Alembic or USD"
+                f"'{cage.name}' skins in a way that Blender's Armature modifier does not know; set its method to "
+                "Linear or Dual Quaternion, or bake to shape keys, Alembic or USD"
             )
         if place == len(self.rigs):
-            self.rigs.append(RigRecord(cage, session.joints, session.influence))
+            self.rigs.append(RigRecord(cage, session.joints, session.influence, method))
             self.size = max(self.size, session.size)
         rig = self.rigs[place]
+        if method != rig.method:
+            raise BakeError(f"The method of '{cage.name}' changes up to frame {time:g}; let it be one throughout")
         moved = np.linalg.norm(session.joints - rig.joints, axis=1).max()
         if session.influence != rig.influence or moved > STILL * session.size:
             raise BakeError(

@@ -185,6 +185,32 @@ def test_modifiers_that_stand_still_before_ours_are_in_the_rest_shape() -> None:
         bake().to_native_rig(rig.cage, 1, 25)
 
 
+# What Blender's Preserve Volume makes of shear and of scale along an axis, or of turns that cancel out.
+VOLUME_DIFFERS = {
+    "scaled_bones",
+    "collapsed_bone",
+    "copies_and_limits",
+    "targets_outside",
+    "every_inherit_scale",
+    "no_inherited_rotation",
+    "eight_influences",
+}
+
+
+@pytest.mark.parametrize("name", [name for name in rigs.RIGS if name not in TURNING])
+def test_dual_quaternions_play_as_preserve_volume_or_are_refused(name: str) -> None:
+    rig = shaped_rig(name)
+    rig.settings.method = "DQS"
+    go_to(1)
+    if name in VOLUME_DIFFERS:
+        with untouched(), pytest.raises(bake().BakeError, match="Preserve Volume does otherwise"):
+            bake().to_native_rig(rig.cage, 1, 25)
+        return
+    made = bake().to_native_rig(rig.cage, 1, 25)
+    assert worst(rig, made.skins, EVERY_FRAME) < 1e-5
+    assert "Preserve Volume" in made.summary
+
+
 def animated_cage(rig: Rig) -> None:
     fat_key(rig).keyframe_insert("value", frame=1)
 
@@ -204,7 +230,7 @@ def other_method(rig: Rig) -> None:
     [
         (animated_cage, "'LimbCage' is animated"),
         (animated_influence, "influence changes up to frame 2"),
-        (other_method, "set its method to Linear"),
+        (other_method, "set its method to Linear or Dual Quaternion"),
     ],
 )
 def test_refusals(spoil: Callable[[Rig], None], words: str) -> None:
