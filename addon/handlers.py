@@ -42,12 +42,45 @@ def redo_post(*_: object) -> None:
 
 
 @persistent
+def render_init(*_: object) -> None:
+    if not bpy.app.background:
+        sync.rendering(True)
+
+
+@persistent
+def render_complete(*_: object) -> None:
+    _render_ended()
+
+
+@persistent
+def render_cancel(*_: object) -> None:
+    _render_ended()
+
+
+def _render_ended() -> None:
+    if not bpy.app.background:
+        sync.rendering(False)
+        bpy.app.timers.register(sync.restored, first_interval=0.0)  # in the main thread, when the render has let go
+
+
+@persistent
 def load_post(*_: object) -> None:
     sync.forget()
     sync.restored()
 
 
-HANDLERS = (depsgraph_update_post, frame_change_post, undo_pre, undo_post, redo_pre, redo_post, load_post)
+HANDLERS = (
+    depsgraph_update_post,
+    frame_change_post,
+    undo_pre,
+    undo_post,
+    redo_pre,
+    redo_post,
+    render_init,
+    render_complete,
+    render_cancel,
+    load_post,
+)
 
 
 def register() -> None:

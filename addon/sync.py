@@ -53,6 +53,7 @@ class _Running:
 _running: dict[int, _Running] = {}
 _busy = False
 _restoring = False
+_rendering = False
 _again: set[registry.Key] = set()  # rest cages whose rigs need one more update
 
 
@@ -71,6 +72,8 @@ def drop(cage: bpy.types.Object) -> None:
 
 def edited(depsgraph: bpy.types.Depsgraph) -> None:
     """After an update of the viewport: sync the rigs that it touched."""
+    if _rendering and depsgraph.mode == "VIEWPORT":
+        return
     event = Event.RESTORED if _restoring else Event.EDIT
     cages = registry.touched(depsgraph)
     if _again:
@@ -82,9 +85,20 @@ def edited(depsgraph: bpy.types.Depsgraph) -> None:
 
 def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     """After a frame change, in the viewport's depsgraph or a render's: sync every rig."""
+    if _rendering and depsgraph.mode == "VIEWPORT":
+        return
     _again.clear()
     for cage in registry.rigs():
         update(cage, depsgraph, Event.FRAME)
+
+
+def rendering(under_way: bool) -> None:
+    """A render begins or ends. While it lasts its frames alone are synced: it runs in a thread of its own, and both
+    would write to the same meshes.
+    """
+    global _rendering
+    _rendering = under_way
+    _again.clear()
 
 
 def restoring() -> None:
