@@ -269,12 +269,15 @@ def _is_known(running: _Running, rest: Points) -> bool:
 def _posed_is_edit(cage: bpy.types.Object, event: Event, rest_changed: bool) -> bool:
     """Whether a changed posed cage is the artist's edit, and not what a pose, a key or an undo made of it.
 
-    In Edit Mode its edit mesh is the truth, undo included, unless the rest cage is the one in the artist's hands.
+    In Edit Mode its edit mesh is the truth, undo included, unless the rest cage is the one in the artist's hands. In
+    Sculpt Mode an undo restores that mesh alone too.
     """
     if event is Event.FRAME:
         return False
     if not cage.cage_rig.posed_cage.data.is_editmode:
-        return event is Event.EDIT and not rest_changed
+        if event is Event.RESTORED:
+            return cage.cage_rig.posed_cage.mode == "SCULPT"
+        return not rest_changed
     if event is Event.RESTORED:
         return True
     return not (rest_changed and cage.data.is_editmode and bpy.context.view_layer.objects.active == cage)
@@ -282,6 +285,8 @@ def _posed_is_edit(cage: bpy.types.Object, event: Event, rest_changed: bool) -> 
 
 def _take_posed_edit(cage: bpy.types.Object, running: _Running, posed: Points) -> str:
     """The artist moved the posed cage: move the rest cage so that it goes there, or say why that can't be."""
+    if np.allclose(posed, running.session.posed_cage(), rtol=0.0, atol=1e-6 * running.session.size):
+        return ""
     keyed = not cage.data.is_editmode and cage_keys.takes_edits(cage)
     try:
         if not cage.data.is_editmode:
