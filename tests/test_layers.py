@@ -32,7 +32,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
     ),
     "exchange": ({"numpy", "pathlib", "zipfile"}, {"exchange"}),
-    "exchange/__init__": ({"bpy", "pathlib"}, {"exchange"}),
+    "exchange/__init__": ({"bpy"}, {"exchange"}),
     "exchange/live": (
         {"bpy", "numpy", "pathlib"},
         {"bake", "binding", "exchange", "lifecycle", "session", "sync"},

@@ -10,9 +10,13 @@ from .bake import CAGE_RIG_OT_bake
 from .bind import CAGE_RIG_OT_bind
 from .delete_key import CAGE_RIG_OT_delete_key
 from .discard_edit import CAGE_RIG_OT_discard_edit
+from .drop_coordinates import CAGE_RIG_OT_drop_coordinates
+from .export_coordinates import CAGE_RIG_OT_export_coordinates
+from .import_rig import CAGE_RIG_FH_prototype, CAGE_RIG_OT_import_rig
 from .jump_to_key import CAGE_RIG_OT_jump_to_key
 from .key_cage import CAGE_RIG_OT_key_cage
 from .key_envelope import CAGE_RIG_OT_key_envelope
+from .load_coordinates import CAGE_RIG_OT_load_coordinates
 from .rebind import CAGE_RIG_OT_rebind
 from .select_part import CAGE_RIG_OT_select_part
 from .unbind import CAGE_RIG_OT_unbind
@@ -29,6 +33,11 @@ CLASSES = (
     CAGE_RIG_OT_discard_edit,
     CAGE_RIG_OT_jump_to_key,
     CAGE_RIG_OT_select_part,
+    CAGE_RIG_OT_import_rig,
+    CAGE_RIG_FH_prototype,
+    CAGE_RIG_OT_load_coordinates,
+    CAGE_RIG_OT_drop_coordinates,
+    CAGE_RIG_OT_export_coordinates,
 )
 
 
@@ -37,13 +46,30 @@ def _object_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.operator(CAGE_RIG_OT_bind.bl_idname)
 
 
+def _import_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.operator(CAGE_RIG_OT_import_rig.bl_idname, text="Cage Rig Prototype (.skt)")
+
+
+def _export_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.operator(CAGE_RIG_OT_export_coordinates.bl_idname, text="Cage Rig Coordinates (.npz)")
+
+
+MENUS = (
+    (bpy.types.VIEW3D_MT_object, _object_menu),
+    (bpy.types.TOPBAR_MT_file_import, _import_menu),
+    (bpy.types.TOPBAR_MT_file_export, _export_menu),
+)
+
+
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.VIEW3D_MT_object.append(_object_menu)
+    for menu, draw in MENUS:
+        menu.append(draw)
 
 
 def unregister() -> None:
-    bpy.types.VIEW3D_MT_object.remove(_object_menu)
+    for menu, draw in MENUS:
+        menu.remove(draw)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

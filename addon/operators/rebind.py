@@ -22,9 +22,11 @@ class CAGE_RIG_OT_rebind(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = props.rig_of(context.object)
         try:
-            lifecycle.rebind(context, cage)
+            dropped = lifecycle.rebind(context, cage)
         except lifecycle.BindError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.report({"INFO"}, lifecycle.summary(cage))
+        if dropped:
+            self.report({"WARNING"}, dropped)
         return {"FINISHED"}
