@@ -139,6 +139,87 @@ class CageRigSettings(bpy.types.PropertyGroup):
     suspended: CollectionProperty(type=CageRigSuspended, override=OVERRIDABLE | {"USE_INSERTION"})
 
 
+def _clear_message(overlays: CageRigOverlays, _context: bpy.types.Context) -> None:
+    if overlays.message:
+        overlays.message = ""
+
+
+class CageRigOverlays(bpy.types.PropertyGroup):
+    """What 3D Views show of a rig beside what Blender draws itself: `workspace.cage_rig_overlays`.
+
+    On the workspace, as it is a way of looking: saved with the file like Blender's own overlays, and never undone.
+    """
+
+    weights: BoolProperty(
+        name="Weights",
+        description="Colour the skins by how much the selected cage vertices (in Edit Mode of a cage), "
+        "or the active bone (in Pose Mode), move them. Pink is moved the other way",
+        update=_clear_message,
+        options=set(),
+    )
+    weights_opacity: FloatProperty(
+        name="Opacity",
+        description="How much the colours cover the skin's own look",
+        default=0.75,
+        min=0.05,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+    )
+    joint_weights: BoolProperty(
+        name="Joint on the Cage",
+        description="Dots on the posed cage, in Pose Mode: how much each of its vertices moves the active bone's "
+        "joint. Larger and lighter is more; pink is the other way",
+        update=_clear_message,
+        options=set(),
+    )
+    joints: BoolProperty(
+        name="Refit Joints",
+        description="The joints and bones as they are refit to the edited cage. "
+        "Where they differ from the animation's own, those are shown in grey and a line leads from one to the other",
+        update=_clear_message,
+        options=set(),
+    )
+    joints_in_front: BoolProperty(
+        name="In Front", description="Show refit joints and bones through the skin", default=True, options=set()
+    )
+    anchors: BoolProperty(
+        name="Anchors",
+        description="Dots on the skins where the posed cage holds on to them: it is fitted to these points",
+        update=_clear_message,
+        options=set(),
+    )
+    fade: BoolProperty(
+        name="Fading Cages",
+        description="Draw hidden cages: in full near the mouse cursor and faintly elsewhere. "
+        "Cages that are not hidden are drawn by Blender as always",
+        update=_clear_message,
+        options=set(),
+    )
+    fade_radius: IntProperty(
+        name="Radius",
+        description="How far from the mouse cursor hidden cages have faded away",
+        default=160,
+        min=20,
+        max=2000,
+        soft_max=600,
+        subtype="PIXEL",
+        options=set(),
+    )
+    fade_minimum: FloatProperty(
+        name="Elsewhere",
+        description="What is left of hidden cages far from the mouse cursor",
+        default=0.12,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+    )
+    message: StringProperty(
+        name="Message", description="Why an overlay was switched off, or nothing", options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+
 def rig_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     """The rest cage of the rig that `obj` is part of: cage, skin, posed cage, refit bones or armature."""
     if obj is None:
@@ -150,16 +231,18 @@ def rig_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return obj.cage_rig.owner
 
 
-CLASSES = (CageRigJoint, CageRigSuspended, CageRigSkin, CageRigSettings)
+CLASSES = (CageRigJoint, CageRigSuspended, CageRigSkin, CageRigSettings, CageRigOverlays)
 
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Object.cage_rig = PointerProperty(type=CageRigSettings, name="Cage Rig", override=OVERRIDABLE)
+    bpy.types.WorkSpace.cage_rig_overlays = PointerProperty(type=CageRigOverlays, name="Cage Rig Overlays")
 
 
 def unregister() -> None:
+    del bpy.types.WorkSpace.cage_rig_overlays
     del bpy.types.Object.cage_rig
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -7,6 +7,7 @@ A session is made from a bind snapshot alone and can be thrown away at any momen
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar
@@ -267,6 +268,35 @@ class Session:
         if self._posed_cage is None or self._posed_cage[0] != self.revision:
             self._posed_cage = (self.revision, self.rig.posed_cage.astype(np.float32))
         return self._posed_cage[1]
+
+    def cage_coords(self) -> NDArray[np.float32]:
+        """How much each cage vertex moves each skin vertex, `#M by #C` over all skins: Φ, a large copy."""
+        return np.asarray(self.rig.cage_coords, np.float32)
+
+    def joint_coords(self, joint: int) -> Matrices:
+        """How much each cage vertex moves this joint, `#C`: its row of Ψ."""
+        return np.asarray(self.rig.joint_coords[joint])
+
+    def skin_weights(self, joint: int) -> NDArray[np.float32]:
+        """How much this joint moves each vertex, `#M` over all skins: its column of Ω. Rows sum to 1, or to 0."""
+        weights = np.zeros(self.starts[-1], np.float32)
+        for start, skin in zip(self.starts, self.snapshot.skins, strict=False):
+            indptr, columns, values = skin.weights
+            at = np.flatnonzero((columns == joint) & (values > 0.0))
+            row = np.searchsorted(indptr, at, side="right") - 1
+            upto = np.concatenate([[0.0], np.cumsum(values)])
+            weights[start + row] = values[at] / (upto[indptr[row + 1]] - upto[indptr[row]])
+        return weights
+
+    def anchors(self) -> list[NDArray[np.int64]]:
+        """The vertices of each skin that the posed cage is fitted to."""
+        found = np.sort(self.rig.anchors)
+        return [found[(found >= a) & (found < b)] - a for a, b in itertools.pairwise(self.starts.tolist())]
+
+    def posed_bones(self) -> tuple[Matrices, Matrices]:
+        """Posed heads and tails of the refit bones, each `#J by 3` in rig space; bones keep their rest length."""
+        along = np.einsum("jkl,jl->jk", self.rig.transforms[:, :3, :3], self.snapshot.tails - self.snapshot.heads)
+        return np.asarray(self.rig.posed_joints), np.asarray(self.rig.posed_joints + along)
 
     @_door
     def refit_pose(self, rest: Matrices) -> Matrices:

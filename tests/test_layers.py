@@ -46,6 +46,10 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "handlers": ({"bpy"}, {"sync"}),
     "operators": ({"bpy"}, {"bake", "exchange", "keying", "lifecycle", "operators", "props", "selection"}),
     "ui": ({"bpy"}, {"props", "ui"}),
+    "ui/overlays": (
+        {"blf", "bpy", "gpu", "gpu_extras", "mathutils", "numpy"},
+        {"adapters", "health", "props", "registry", "session", "sync", "ui"},
+    ),
     "__init__": (set(), {"handlers", "operators", "props", "ui"}),
 }
 STANDARD = {"__future__", "atexit", "collections", "contextlib", "dataclasses", "enum", "functools", "itertools"}
@@ -53,9 +57,9 @@ STANDARD |= {"math", "re", "textwrap", "typing", "uuid"}
 
 
 def layer_of(path: Path) -> str:
-    """Where in `ALLOWED` a file is: by itself, or with its folder."""
+    """Where in `ALLOWED` a file is: by itself, or with one of its folders."""
     inside = path.relative_to(ADDON).with_suffix("")
-    return inside.as_posix() if inside.as_posix() in ALLOWED else inside.parts[0]
+    return next((name for name in map(str, (inside, *inside.parents)) if name in ALLOWED), inside.parts[0])
 
 
 def imports(path: Path) -> tuple[set[str], set[str], list[int]]:

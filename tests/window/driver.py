@@ -45,7 +45,7 @@ def perform(acts: Iterator[float | None]) -> None:
         (OUT / "result.json").write_text(json.dumps(_checks))
         os._exit(0)
 
-    bpy.app.timers.register(step, first_interval=3.0)
+    bpy.app.timers.register(step, first_interval=3.0, persistent=True)
 
 
 def screenshot(name: str) -> None:
