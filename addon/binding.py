@@ -57,6 +57,9 @@ def _read_rows(settings: bpy.types.PropertyGroup, name: str) -> NDArray[np.float
 def write_known(cage: bpy.types.Object, known: Known) -> None:
     """Keep coordinates with the rig's snapshots, instead of those that were kept."""
     settings, start = cage.cage_rig, 0
+    for owner in (settings, *settings.skins):
+        if owner.snapshot.users > 1:  # a duplicate of the character has it too
+            owner.snapshot = owner.snapshot.copy()
     for skin in settings.skins:
         end = start + len(skin.snapshot.vertices)
         for name in ("cage_coords", "center_coords"):

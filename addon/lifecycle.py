@@ -457,7 +457,8 @@ def _at_rest(context: bpy.types.Context, armature_object: bpy.types.Object) -> I
 
 
 def _remove_mesh(mesh: bpy.types.Mesh | None) -> None:
-    if mesh is not None and mesh.library is None:
+    """Remove a rig's mesh, unless a duplicate of the character has it too."""
+    if mesh is not None and mesh.library is None and mesh.users <= 1:
         bpy.data.meshes.remove(mesh)
 
 
