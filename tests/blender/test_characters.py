@@ -1,6 +1,7 @@
 """Real rigs: every rigged glTF character that lies beside the project binds, plays and shows what Blender shows.
 
-The largest takes long and runs only where CAGE_RIG_LARGE_CHARACTERS is set.
+Two of them as FBX too, by either importer of Blender. The largest takes long and runs only where
+CAGE_RIG_LARGE_CHARACTERS is set.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import addon_utils
 import bpy
 import numpy as np
 import pytest
 import truth
 from mathutils import Quaternion
-from scene import Rig, bind, fat_key, rest, set_mesh, shown, update
+from scene import Rig, bind, fat_key, rest, select, set_mesh, shown, update
 
 from blend_fixtures.build import RigObjects, add_cage
 
@@ -48,14 +50,20 @@ def load(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     monkeypatch.syspath_prepend(str(ROOT / "demo"))
     from showcase.coarse_hull import coarse_hull
 
-    yield lambda path: with_hull(*imported(path), coarse_hull)
+    yield lambda path, importer="gltf": with_hull(*imported(path, importer), coarse_hull)
     for name in [name for name in sys.modules if name.split(".")[0] == "showcase"]:
         del sys.modules[name]
 
 
-def imported(path: Path) -> tuple[bpy.types.Object, list[bpy.types.Object]]:
-    """Armature and skins as Blender's importer makes them, vertices welded."""
-    bpy.ops.import_scene.gltf(filepath=str(path), merge_vertices=True)
+def imported(path: Path, importer: str = "gltf") -> tuple[bpy.types.Object, list[bpy.types.Object]]:
+    """Armature and skins as an importer of Blender makes them, vertices welded."""
+    if importer == "gltf":
+        bpy.ops.import_scene.gltf(filepath=str(path), merge_vertices=True)
+    elif importer == "import_scene.fbx":
+        addon_utils.enable("io_scene_fbx")
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    else:
+        bpy.ops.wm.fbx_import(filepath=str(path))
     armature = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
     skins = [obj for obj in bpy.data.objects if any(mod.type == "ARMATURE" for mod in obj.modifiers)]
     for skin in skins:
@@ -123,6 +131,33 @@ def assert_edits(rig: Rig, frame: int) -> None:
 @pytest.mark.parametrize("path", characters())
 def test_a_real_character_binds_plays_and_takes_edits(path: Path, load: object) -> None:
     rig = bind(load(path))
+    assert rig.settings.state == "LIVE", rig.settings.message
+    frames = frames_of(rig.armature)
+    assert_plays(rig, frames)
+    assert_edits(rig, frames[1])
+
+
+def as_fbx(path: Path, folder: Path) -> Path:
+    """The character, with a motion, through Blender's FBX exporter; an empty file is open after."""
+    addon_utils.enable("io_scene_fbx")
+    armature, skins = imported(path)
+    frames_of(armature)
+    select([armature, *skins], armature)
+    file = folder / f"{path.stem}.fbx"
+    bpy.ops.export_scene.fbx(filepath=str(file), use_selection=True, bake_anim_use_nla_strips=False)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return file
+
+
+@pytest.mark.parametrize("importer", ["import_scene.fbx", "wm.fbx_import"])
+@pytest.mark.parametrize("name", ["fox_576_24b", "human_2k_53b"])
+def test_a_real_character_comes_through_fbx(name: str, importer: str, load: object, tmp_path: Path) -> None:
+    path = CHARACTERS / f"{name}.glb"
+    if not path.is_file():
+        pytest.skip(f"{path.name} is not in {CHARACTERS}")
+    if importer.startswith("wm") and bpy.app.version < (4, 5):
+        pytest.skip("Blender has that importer from 4.5 on")
+    rig = bind(load(as_fbx(path, tmp_path), importer))
     assert rig.settings.state == "LIVE", rig.settings.message
     frames = frames_of(rig.armature)
     assert_plays(rig, frames)
