@@ -28,7 +28,7 @@ NAMES = {
     "coordinates": ("_cage" + CAGE_WEIGHTS, CAGE_WEIGHTS),
     "centers": ("_corWeights.txt",),
 }
-NEEDED = ("mesh", "weights", "cage")
+NEEDED = {"mesh": "skin", "weights": "weights", "cage": "cage"}
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,9 @@ def find(path: Path, given: dict[str, Path]) -> tuple[Path, dict[str, Path]]:
         beside = [skeleton.with_name(skeleton.stem + ending) for ending in endings]
         chosen = given.get(name) or next((file for file in beside if file.is_file()), None)
         if chosen is None and name in NEEDED:
-            raise FileError(f"There is no '{beside[0].name}' beside '{skeleton.name}'; choose the {name} file")
+            raise FileError(
+                f"There is no '{beside[0].name}' beside '{skeleton.name}'; choose the file of the {NEEDED[name]}"
+            )
         if chosen is not None:
             found[name] = chosen
     return skeleton, found

@@ -21,7 +21,7 @@ def load_text_rig(path: Path) -> tuple[RigObjects, int, str]:
     try:
         bpy.ops.cage_rig.import_rig(filepath=str(path), bind=False)
     except RuntimeError as error:
-        raise ValueError(str(error)) from error
+        raise ValueError(str(error).removeprefix("Error: ").strip()) from error
     cage, scene = bpy.context.object, bpy.context.scene
     armature = cage.parent
     skin = next(child for child in armature.children if child != cage)

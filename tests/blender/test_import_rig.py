@@ -138,7 +138,7 @@ def test_it_may_lie_otherwise_and_unbound(skt: Path) -> None:
 
 def test_files_elsewhere_may_be_named(skt: Path, tmp_path: Path) -> None:
     (tmp_path / "bar_cage.obj").rename(tmp_path / "box.obj")
-    with pytest.raises(RuntimeError, match=r"no 'bar_cage.obj' beside 'bar.skt'; choose the cage file"):
+    with pytest.raises(RuntimeError, match=r"no 'bar_cage.obj' beside 'bar.skt'; choose the file of the cage"):
         load(skt)
     _, _, cage = load(skt, cage=str(tmp_path / "box.obj"), use_coordinates=False)
     assert cage.cage_rig.state == "LIVE" and cage.cage_rig.coordinates == ""

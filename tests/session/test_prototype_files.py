@@ -74,7 +74,7 @@ def test_a_folder_with_one_rig_means_that_rig(exchange: SimpleNamespace, skt: Pa
 def test_files_elsewhere_are_given(exchange: SimpleNamespace, skt: Path, tmp_path: Path) -> None:
     elsewhere = tmp_path / "weights.txt"
     (tmp_path / "bar.skw").rename(elsewhere)
-    with pytest.raises(exchange.text.FileError, match=r"no 'bar.skw' beside 'bar.skt'; choose the weights file"):
+    with pytest.raises(exchange.text.FileError, match=r"no 'bar.skw' beside 'bar.skt'; choose the file of the weights"):
         exchange.rig_files.find(skt, {})
     _, files = exchange.rig_files.find(skt, {"weights": elsewhere})
     assert files["weights"] == elsewhere
