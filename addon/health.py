@@ -13,8 +13,19 @@ from . import layers, linked
 from .adapters import armature, modifier, positions, stack
 
 
+class Problem(str):
+    """A sentence for the artist, and what a button can do about it: "what:name", see `repair`; empty where nothing."""
+
+    fix: str
+
+    def __new__(cls, sentence: str, fix: str = "") -> Problem:
+        made = super().__new__(cls, sentence)
+        made.fix = fix
+        return made
+
+
 def problem(cage: bpy.types.Object) -> str:
-    """Why the rig can't run and what to do, or an empty string."""
+    """Why the rig can't run and what to do, as a `Problem` where a button can help, or an empty string."""
     settings = cage.cage_rig
     if settings.version > 1:
         return f"'{cage.name}' was bound with a newer Cage Rig; update the extension"
@@ -26,15 +37,21 @@ def problem(cage: bpy.types.Object) -> str:
         or _armature_problem(cage)
         or _cage_problem(cage)
         or _skins_problem(cage)
-        or layers.problem(cage)
+        or _layers_problem(cage)
         or _below_problem(cage)
     )
+
+
+def _layers_problem(cage: bpy.types.Object) -> str:
+    sentence = layers.problem(cage)
+    return Problem(sentence, "clear_input") if sentence and cage.cage_rig.input is not None else sentence
 
 
 def _below_problem(cage: bpy.types.Object) -> str:
     for lower in layers.below(cage):
         if lower.cage_rig.state != "LIVE":
-            return f"'{cage.name}' stands on '{lower.name}', which is paused: {lower.cage_rig.message}"
+            sentence = f"'{cage.name}' stands on '{lower.name}', which is paused: {lower.cage_rig.message}"
+            return Problem(sentence, f"select:{lower.name}")
     return ""
 
 
@@ -64,7 +81,7 @@ def _armature_problem(cage: bpy.types.Object) -> str:
         return ""
     missing = follow_renames(cage)
     if missing:
-        return f"Bone '{missing}' of '{obj.name}' was deleted; undo, or press Rebind"
+        return Problem(f"Bone '{missing}' of '{obj.name}' was deleted; undo, or press Rebind", "rebind")
     bones = obj.data.bones
     for joint in cage.cage_rig.joints:
         if joint.weighted and bones[joint.name].bbone_segments > 1:
@@ -74,7 +91,10 @@ def _armature_problem(cage: bpy.types.Object) -> str:
 
 def bendy(obj: bpy.types.Object, bone: str) -> str:
     """Why a B-bone that deforms can't be followed."""
-    return f"Bone '{bone}' of '{obj.name}' is a B-bone and deforms the skin; set its segments to 1 (Bone, Bendy Bones)"
+    return Problem(
+        f"Bone '{bone}' of '{obj.name}' is a B-bone and deforms the skin; set its segments to 1 (Bone, Bendy Bones)",
+        f"segments:{bone}",
+    )
 
 
 def _cage_problem(cage: bpy.types.Object) -> str:
@@ -82,45 +102,51 @@ def _cage_problem(cage: bpy.types.Object) -> str:
     if not _in_use(cage):
         return f"Cage '{cage.name}' was deleted; undo, or link it into a collection again"
     if settings.snapshot is None:
-        return f"What was bound of '{cage.name}' is lost; press Rebind"
+        return Problem(f"What was bound of '{cage.name}' is lost; press Rebind", "rebind")
     if settings.posed_cage is None or not _in_use(settings.posed_cage):
-        return f"The posed cage of '{cage.name}' was deleted; undo, or press Rebind to make a new one"
+        sentence = f"The posed cage of '{cage.name}' was deleted; undo, or press Rebind to make a new one"
+        return Problem(sentence, "rebind")
     for obj in (cage, settings.posed_cage):
         if obj.data.is_editmode:
             count, bound = positions.edit_vertex_count(obj.data), len(settings.snapshot.vertices)
         else:
             count, bound = positions.topology(obj.data), positions.topology(settings.snapshot)
         if count != bound:
-            return f"'{obj.name}' has other vertices or faces than when it was bound; undo, or press Rebind"
+            sentence = f"'{obj.name}' has other vertices or faces than when it was bound; undo, or press Rebind"
+            return Problem(sentence, "rebind")
     return ""
 
 
 def _skins_problem(cage: bpy.types.Object) -> str:
     skins = live_skins(cage)
     if not skins:
-        return f"All skins of '{cage.name}' were deleted; undo, or press Unbind"
+        return Problem(f"All skins of '{cage.name}' were deleted; undo, or press Unbind", "unbind")
     for index, obj in skins:
         snapshot = cage.cage_rig.skins[index].snapshot
         if snapshot is None:
-            return f"What was bound of '{obj.name}' is lost; press Rebind"
+            return Problem(f"What was bound of '{obj.name}' is lost; press Rebind", "rebind")
         if len(obj.data.vertices) != len(snapshot.vertices):
-            return (
+            return Problem(
                 f"'{obj.name}' has {len(obj.data.vertices)} vertices, it had {len(snapshot.vertices)} "
-                "when it was bound; undo, or press Rebind"
+                "when it was bound; undo, or press Rebind",
+                "rebind",
             )
         if modifier.find(obj, cage) is None:
-            return f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind"
+            return Problem(f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind", "rebind")
         blocking = stack.blocking(obj, stack.first(obj))
         if blocking:
-            return f"Modifier '{blocking}' of '{obj.name}' may change the vertices before Cage Rig; move it after"
+            sentence = f"Modifier '{blocking}' of '{obj.name}' may change the vertices before Cage Rig; move it after"
+            return Problem(sentence, f"move_after:{obj.name}")
         mask = cage.cage_rig.skins[index].mask
         if mask and mask not in obj.vertex_groups:
-            return f"Vertex group '{mask}', the mask of '{obj.name}', was deleted; choose another or none"
+            sentence = f"Vertex group '{mask}', the mask of '{obj.name}', was deleted; choose another or none"
+            return Problem(sentence, f"clear_mask:{obj.name}")
         reordering = stack.reordering(obj)
         if reordering:
-            return (
+            return Problem(
                 f"Modifier '{reordering}' of '{obj.name}' may reorder the vertices, so that what the modifiers before "
-                "Cage Rig do, or its mask, can't be read; switch one or the other off"
+                "Cage Rig do, or its mask, can't be read; switch one or the other off",
+                f"select:{obj.name}",
             )
     return ""
 

@@ -27,7 +27,7 @@ OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 METHODS = [
     ("LBS", "Linear", "Linear blend skinning: what Blender's Armature modifier does by default", 0),
     ("DQS", "Dual Quaternion", "Keeps the volume of twisted and bent limbs, as the modifier's Preserve Volume", 1),
-    ("COR", "Centers of Rotation", "Turns every vertex about a center of its own: no bulge at bends", 2),
+    ("COR", "Centers of Rotation", "Turns every vertex about a center of its own: bends bulge less", 2),
 ]
 STATES = [
     ("NONE", "Not Bound", "This object is not the cage of a rig", 0),
@@ -92,6 +92,7 @@ class CageRigSettings(bpy.types.PropertyGroup):
     version: IntProperty(default=0, override=OVERRIDABLE)
     state: EnumProperty(items=STATES, name="State", default="NONE", override=OVERRIDABLE)
     message: StringProperty(name="Message", override=OVERRIDABLE)
+    fix: StringProperty(name="Fix", description="What the panel's button does about the message", override=OVERRIDABLE)
     method: EnumProperty(
         items=METHODS,
         name="Method",
@@ -167,7 +168,7 @@ class CageRigOverlays(bpy.types.PropertyGroup):
         options=set(),
     )
     joint_weights: BoolProperty(
-        name="Joint on the Cage",
+        name="Joint Weights",
         description="Dots on the posed cage, in Pose Mode: how much each of its vertices moves the active bone's "
         "joint. Larger and lighter is more; pink is the other way",
         update=_clear_message,

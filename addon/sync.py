@@ -424,6 +424,7 @@ def _pause(cage: bpy.types.Object, message: str) -> None:
     if (settings.state, settings.message) == ("PAUSED", message):
         return
     settings.state, settings.message = "PAUSED", message
+    settings.fix = getattr(message, "fix", "")
     for obj in layers.skins_of(cage):
         if obj.cage_rig.owner == cage:
             modifier.set_shown(obj, False)
@@ -444,3 +445,5 @@ def _resume(cage: bpy.types.Object, note: str) -> None:
         note = f"{lost} skin(s) of '{cage.name}' were deleted; Rebind forgets them"
     if settings.message != note:
         settings.message = note
+    if settings.fix:
+        settings.fix = ""

@@ -42,10 +42,11 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"adapters", "bake", "exchange", "lifecycle", "session"},
     ),
     "keying": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "sync"}),
+    "repair": ({"bpy"}, {"adapters", "lifecycle"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),
-    "operators": ({"bpy"}, {"bake", "exchange", "keying", "lifecycle", "operators", "props", "selection"}),
-    "ui": ({"bpy"}, {"props", "ui"}),
+    "operators": ({"bpy"}, {"bake", "exchange", "keying", "lifecycle", "operators", "props", "repair", "selection"}),
+    "ui": ({"bpy"}, {"keying", "props", "repair", "ui"}),
     "ui/overlays": (
         {"blf", "bpy", "gpu", "gpu_extras", "mathutils", "numpy"},
         {"adapters", "health", "props", "registry", "session", "sync", "ui"},

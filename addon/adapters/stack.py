@@ -92,6 +92,15 @@ def blocking(skin: bpy.types.Object, index: int) -> str | None:
     return next((m.name for m in _shown_before(skin, index) if m.type not in DEFORMING), None)
 
 
+def move_after(skin: bpy.types.Object) -> None:
+    """Move modifiers that may add or remove vertices from before ours to right after ours."""
+    while True:
+        name = blocking(skin, first(skin))
+        if name is None:
+            return
+        skin.modifiers.move(skin.modifiers.find(name), list(skin.modifiers).index(ours(skin)[-1]))
+
+
 def deformed_before(skin: bpy.types.Object) -> bool:
     """Whether shown modifiers before ours move the skin."""
     return bool(ours(skin)) and bool(_shown_before(skin, first(skin)))

@@ -12,6 +12,7 @@ from .delete_key import CAGE_RIG_OT_delete_key
 from .discard_edit import CAGE_RIG_OT_discard_edit
 from .drop_coordinates import CAGE_RIG_OT_drop_coordinates
 from .export_coordinates import CAGE_RIG_OT_export_coordinates
+from .fix_problem import CAGE_RIG_OT_fix_problem
 from .import_rig import CAGE_RIG_FH_prototype, CAGE_RIG_OT_import_rig
 from .jump_to_key import CAGE_RIG_OT_jump_to_key
 from .key_cage import CAGE_RIG_OT_key_cage
@@ -33,6 +34,7 @@ CLASSES = (
     CAGE_RIG_OT_discard_edit,
     CAGE_RIG_OT_jump_to_key,
     CAGE_RIG_OT_select_part,
+    CAGE_RIG_OT_fix_problem,
     CAGE_RIG_OT_import_rig,
     CAGE_RIG_FH_prototype,
     CAGE_RIG_OT_load_coordinates,

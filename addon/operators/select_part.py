@@ -6,6 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
+from .. import repair
+
 
 class CAGE_RIG_OT_select_part(bpy.types.Operator):
     """Select this object alone"""
@@ -21,13 +23,7 @@ class CAGE_RIG_OT_select_part(bpy.types.Operator):
         return context.mode == "OBJECT"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = context.view_layer.objects.get(self.name)
-        if obj is None:
+        if not repair.select(context, self.name):
             self.report({"WARNING"}, f"'{self.name}' is not in this view layer")
             return {"CANCELLED"}
-        for other in context.selected_objects:
-            other.select_set(False)
-        obj.hide_set(False)
-        obj.select_set(True)
-        context.view_layer.objects.active = obj
         return {"FINISHED"}
