@@ -197,6 +197,21 @@ def disconnect(obj: bpy.types.Object, context: bpy.types.Context, names: list[st
                 bones[name].use_connect = False
 
 
+def let_refer(obj: bpy.types.Object, source: bpy.types.Object, target: bpy.types.Object) -> None:
+    """Let bone constraints and drivers of the armature object that refer to `source` refer to `target`."""
+    holders = [constraint for bone in obj.pose.bones for constraint in bone.constraints]
+    holders += [end for holder in holders if holder.type == "ARMATURE" for end in holder.targets]
+    for holder in holders:
+        for name in ("target", "pole_target"):
+            if getattr(holder, name, None) == source:
+                setattr(holder, name, target)
+    drivers = obj.animation_data.drivers if obj.animation_data else []
+    for variable in [variable for curve in drivers for variable in curve.driver.variables]:
+        for end in variable.targets:
+            if end.id == source:
+                end.id = target
+
+
 def inheritance(bone: bpy.types.Bone | bpy.types.EditBone) -> Inheritance:
     """What the bone inherits of its parent's pose."""
     return bone.use_inherit_rotation, bone.use_local_location, bone.inherit_scale

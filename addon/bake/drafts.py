@@ -67,6 +67,8 @@ class Draft:
         for obj in self.objects:
             collection.objects.link(obj)
         bpy.context.scene.collection.children.link(collection)
+        for obj in self.objects:
+            obj.select_set(False)  # as their sources may be
         return collection
 
 

@@ -7,12 +7,14 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .. import compat
 from .drafts import Draft
 
+Array = NDArray[np.float64]
 LINEAR = 1  # of `Keyframe.interpolation`
+TRANSFORM = (("location", 0, 3, 0.0), ("rotation_quaternion", 3, 7, (1.0, 0.0, 0.0, 0.0)), ("scale", 7, 10, 1.0))
 
 
 class Keys:
@@ -31,3 +33,16 @@ class Keys:
         points.add(len(np.atleast_1d(times)))
         points.foreach_set("co", np.column_stack([times, values]).astype(np.float32).ravel())
         points.foreach_set("interpolation", np.full(len(points), LINEAR, np.int32))
+
+    def add_transform(self, owner: bpy.types.bpy_struct, prefix: str, times: list[float], values: Array) -> None:
+        """What of a place, turn and size (`#times by 10`) differs from rest: at every time where it moves, else once.
+
+        `owner` is an object or a pose bone, and `prefix` the way to it from the datablock.
+        """
+        owner.rotation_mode = "QUATERNION"
+        for path, first, end, rest in TRANSFORM:
+            part = values[:, first:end]
+            setattr(owner, path, part[0])
+            count = len(times) if np.ptp(part, axis=0).any() else int(np.abs(part[0] - rest).max() > 0.0)
+            for k in range(end - first if count else 0):
+                self.add(f"{prefix}{path}", k, times[:count], part[:count, k])

@@ -19,6 +19,7 @@ from ..session import Session
 R = TypeVar("R")
 # A bake on its way: yields its progress, 0 to 1, and returns what it made. Closing it takes back what it has begun.
 Steps = Generator[float, None, R]
+SAMPLES = 100  # the most that a Mesh Cache modifier can play
 
 
 class BakeError(Exception):
@@ -41,8 +42,8 @@ def times(start: int, end: int, *, samples: int = 1, step: int = 1) -> list[floa
     """Frames from `start` to `end`, both included: `samples` a frame, or every `step`th one (and the last)."""
     if end < start:
         raise BakeError(f"There is no frame from {start} to {end}; let the range end where it starts, or after")
-    if samples < 1 or step < 1:
-        raise BakeError("A bake needs at least one sample a frame, and steps of at least one frame")
+    if not 1 <= samples <= SAMPLES or step < 1:
+        raise BakeError(f"A bake takes 1 to {SAMPLES} samples a frame, and steps of at least one frame")
     count = (end - start) * samples
     found = [start + k / samples for k in range(0, count + 1, step)]
     return found if found[-1] == end else [*found, float(end)]
@@ -138,7 +139,7 @@ def _show(obj: bpy.types.Object, stack: ExitStack) -> None:
     if obj.hide_viewport or obj.hide_select:
         stack.callback(_set, obj, hide_viewport=obj.hide_viewport, hide_select=obj.hide_select)
         _set(obj, hide_viewport=False, hide_select=False)
-    if not obj.visible_get() and obj.name not in root.objects:
+    if not obj.visible_get() and obj not in root.objects.values():
         root.objects.link(obj)  # its collections may be hidden or excluded
         stack.callback(root.objects.unlink, obj)
     if obj.hide_get():

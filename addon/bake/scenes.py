@@ -41,6 +41,7 @@ def alembic_steps(
     cage: bpy.types.Object, path: str, frame_start: int, frame_end: int, *, samples: int, subdivide: bool, result: bool
 ) -> Steps[SceneFile]:
     """See `to_alembic`."""
+    _refuse_missing(bpy.app.build_options.alembic, "Alembic")
     times(frame_start, frame_end, samples=samples)
 
     def write(file: Path) -> None:
@@ -65,13 +66,14 @@ def alembic_steps(
     def read(file: Path) -> None:
         compat.call(bpy.ops.wm.alembic_import, filepath=str(file), set_frame_range=False, as_background_job=False)
 
-    return _steps(cage, path, ALEMBIC, (frame_start, frame_end), write, read if result else None)
+    return (yield from _steps(cage, path, ALEMBIC, (frame_start, frame_end), write, read if result else None))
 
 
 def usd_steps(
     cage: bpy.types.Object, path: str, frame_start: int, frame_end: int, *, subdivide: bool, result: bool
 ) -> Steps[SceneFile]:
     """See `to_usd`."""
+    _refuse_missing(bpy.app.build_options.usd, "USD")
     times(frame_start, frame_end)
 
     def write(file: Path) -> None:
@@ -103,7 +105,12 @@ def usd_steps(
             create_world_material=False,
         )
 
-    return _steps(cage, path, USD, (frame_start, frame_end), write, read if result else None)
+    return (yield from _steps(cage, path, USD, (frame_start, frame_end), write, read if result else None))
+
+
+def _refuse_missing(built_in: bool, name: str) -> None:
+    if not built_in:
+        raise BakeError(f"This Blender was built without {name}; use another build, or bake to a Mesh Cache")
 
 
 def _steps(

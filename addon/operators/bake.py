@@ -41,7 +41,7 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
         name="Start", description="First frame; the scene's where it is not set", options={"SKIP_SAVE"}
     )
     frame_end: IntProperty(name="End", description="Last frame; the scene's where it is not set", options={"SKIP_SAVE"})
-    samples: IntProperty(name="Samples", description="How many times a frame, evenly spaced", default=1, min=1, max=64)
+    samples: IntProperty(name="Samples", description="How many times a frame, evenly spaced", default=1, min=1, max=100)
     step: IntProperty(name="Step", description="Frames from one shape key to the next", default=1, min=1)
     subdivide: BoolProperty(
         name="Subdivide", description="Write what a Subdivision Surface modifier makes, and not its control mesh"
@@ -72,7 +72,8 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
         self._fill_in(context)
         self.by_hand = True
         if self.target not in SUFFIXES:
-            return context.window_manager.invoke_props_dialog(self)
+            title = f"Bake to {self.bl_rna.properties['target'].enum_items[self.target].name}"
+            return context.window_manager.invoke_props_dialog(self, title=title, confirm_text="Bake")
         name = bpy.path.clean_name(props.rig_of(context.object).name)
         self.filepath = self.filepath or bpy.path.abspath(f"//{name}{SUFFIXES[self.target][0]}")
         self.filter_glob = ";".join(f"*{suffix}" for suffix in SUFFIXES[self.target])

@@ -140,6 +140,7 @@ def test_a_bake_leaves_the_rest_of_the_file_alone(target: str, tmp_path: Path) -
     live = shown(rig.skin).copy()
     made = file_bake(target, rig, tmp_path)
     objects = list(made.objects)
+    assert not bpy.context.selected_objects
     fresh = {mesh for obj in objects if obj.type == "MESH" for mesh in [obj.data]}
     assert not fresh & {skin.data for skin in rig.skins}
     assert not any(obj.cage_rig.part != "NONE" or obj.cage_rig.owner for obj in objects)
@@ -367,8 +368,9 @@ def test_the_operator_bakes_to_every_target(tmp_path: Path) -> None:
     assert made == ["LimbCage Mesh Cache", "LimbCage Native", "LimbCage Shape Keys"]
     keys = bpy.data.collections["LimbCage Shape Keys"].objects[0].data.shape_keys.key_blocks.keys()
     assert list(keys) == ["Basis", *(f"Frame {frame}" for frame in range(2, 7))]
-    with pytest.raises(RuntimeError, match="no frame from 9 to 6"):
-        operator(target="SHAPE_KEYS", frame_start=9)
+    for target in ("MESH_CACHE", "ALEMBIC", "USD", "SHAPE_KEYS", "NATIVE_RIG"):
+        with pytest.raises(RuntimeError, match="Error: There is no frame from 9 to 6"):
+            operator(target=target, frame_start=9, filepath=str(tmp_path / "y"))
 
 
 def test_the_operator_asks_for_a_rig() -> None:

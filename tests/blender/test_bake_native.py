@@ -104,6 +104,26 @@ def test_rest_bones_are_the_refit_joints_and_keep_their_orientation() -> None:
         assert bones[name].parent is None or bones[name].parent.name == rig.armature.data.bones[name].parent.name
 
 
+def test_mirrored_bones_go_where_each_belongs() -> None:
+    rig = bind(rigs.build_rig("mirrored_bones"))
+    rig.armature.data.use_mirror_x = True
+    set_mesh(rig.cage, rest(rig.cage) * np.float32([1.3, 1.2, 1.0]) + np.float32([0.2, 0.1, 0.1]))
+    made = bake().to_native_rig(rig.cage, 1, 25)
+    assert worst(rig, made.skins, EVERY_FRAME) < 2e-6
+    assert made.armature.data.use_mirror_x
+
+
+def test_with_its_own_action_drivers_and_constraints_are_its_own_too() -> None:
+    rig = shaped_rig("driven_bones")
+    limit = rig.armature.pose.bones["bone.0"].constraints.new("COPY_ROTATION")
+    limit.target, limit.subtarget, limit.influence = rig.armature, "bone.1", 0.0
+    made = bake().to_native_rig(rig.cage, 1, 25, keep_action=True)
+    drivers = made.armature.animation_data.drivers
+    assert len(drivers) == 3
+    targets = {end.id for curve in drivers for variable in curve.driver.variables for end in variable.targets}
+    assert targets == {made.armature} == {made.armature.pose.bones["bone.0"].constraints[0].target}
+
+
 def test_the_walking_biped_in_other_proportions() -> None:
     character = biped()
     objects = build_character(replace(character, shape_keys={}))
