@@ -282,10 +282,12 @@ class Session:
         weights = np.zeros(self.starts[-1], np.float32)
         for start, skin in zip(self.starts, self.snapshot.skins, strict=False):
             indptr, columns, values = skin.weights
-            at = np.flatnonzero((columns == joint) & (values > 0.0))
+            at = np.flatnonzero(columns == joint)
+            at = at[values[at] > 0.0]
             row = np.searchsorted(indptr, at, side="right") - 1
-            upto = np.concatenate([[0.0], np.cumsum(values)])
-            weights[start + row] = values[at] / (upto[indptr[row + 1]] - upto[indptr[row]])
+            spans = np.stack([indptr[row], indptr[row + 1]], axis=1).ravel()
+            if len(at):
+                weights[start + row] = values[at] / np.add.reduceat(np.append(values, 0.0), spans)[::2]
         return weights
 
     def anchors(self) -> list[NDArray[np.int64]]:

@@ -33,6 +33,13 @@ def chosen(overlays: ModuleType, kept: object) -> object:
     return kept.choice.read(bpy.context, subject(overlays))
 
 
+class Seen:
+    """The context, as a 3D View that hides nothing has it."""
+
+    space_data = None
+    view_layer = property(lambda _: bpy.context.view_layer)
+
+
 def heat(overlays: ModuleType, kept: object, opacity: float = 1.0) -> list:
     return kept.heat.on(subject(overlays), chosen(overlays, kept), opacity)
 
@@ -314,6 +321,14 @@ def test_refit_joints_and_the_animations_own(overlays: ModuleType, kept: object,
     assert np.allclose(strokes.end[apart], refit[moved], atol=1e-5)
 
 
+def test_bones_that_move_no_skin_are_skipped(overlays: ModuleType) -> None:
+    above = overlays.figures._weighted_parents
+    parents = np.int32([-1, 0, 1, 2, 3, 3])
+    weighted = np.array([True, False, False, True, True, False])
+    assert above(parents, weighted).tolist() == [-1, 0, 0, 0, 3, 3]
+    assert above(parents, np.zeros(6, bool)).tolist() == [-1] * 6
+
+
 def test_anchors_are_on_the_skin(overlays: ModuleType, kept: object, bar: Rig) -> None:
     bend(bar, 0.7)
     select([bar.cage], bar.cage)
@@ -368,6 +383,41 @@ def test_drawn_cages_follow(overlays: ModuleType, kept: object, bar: Rig) -> Non
         assert np.allclose(strokes.start[dots], shown(obj), atol=1e-5)
         edges = {tuple(edge.vertices) for edge in obj.data.edges}
         assert int((~dots).sum()) == len(edges)
+
+
+def test_hidden_cages_are_where_the_rig_is(overlays: ModuleType, kept: object, bar: Rig) -> None:
+    bar.posed.hide_viewport = True
+    choose_bone(bar, "upper")
+    leave_edit_mode()
+    bar.armature.location = (3.0, 0.0, 1.0)
+    update()
+    found = subject(overlays)
+    ((obj, _, _),) = kept.cages.hidden(found)
+    assert np.allclose(found.placed(obj).translation, (3.0, 0.0, 1.0), atol=1e-6)
+
+
+def test_the_legend_says_what_is_missing(overlays: ModuleType, kept: object, bar: Rig) -> None:
+    settings = bpy.context.workspace.cage_rig_overlays
+    settings.weights = settings.joint_weights = settings.fade = True
+
+    def entries() -> list:
+        return kept.entries(Seen(), settings, subject(overlays))
+
+    select([bar.armature], bar.armature)
+    assert [entry.split(":")[0] for entry in entries()] == ["Fading Cages", "Weights", "Joint Weights"]
+    bar.cage.hide_set(True)
+    choose_bone(bar, "upper")
+    joint, skin = entries()
+    assert "upper" in joint.label and "upper" in skin.label
+    assert np.isclose(skin.high, session(bar).skin_weights(1).max()) and skin.low == 0.0
+
+
+def test_numbers_of_the_legend_are_short(overlays: ModuleType) -> None:
+    entry, number = overlays.legend.entry, overlays.legend.number
+    assert entry("", -1e-5, 0.5).low == 0.0 and entry("", -0.1, 0.5).low == -0.1
+    assert [number(value) for value in (0.0, 1.0, 0.388, 0.0012, -0.05)] == ["0", "1.00", "0.39", "0.0012", "-0.05"]
+    shades = overlays.legend.shades(entry("", -0.5, 1.0))
+    assert shades[0, 0] > shades[0, 2] and shades[-1, 1] > 0.8
 
 
 def test_a_paused_rig_has_no_overlays(overlays: ModuleType, bar: Rig) -> None:

@@ -24,13 +24,13 @@ class Overlays:
     """All overlays and what they keep between drawings. Can be thrown away at any moment."""
 
     def __init__(self) -> None:
-        surfaces = Surfaces()
+        surfaces, ink = Surfaces(), shaders.Ink()
         self.choice = subject.Choice()
         self.heat = HeatMap(surfaces)
-        self.cages = Cages()
-        self.anchors = Anchors(surfaces)
-        self.joints = Joints()
-        self.joint_weights = JointWeights()
+        self.cages = Cages(ink)
+        self.anchors = Anchors(surfaces, ink)
+        self.joints = Joints(ink)
+        self.joint_weights = JointWeights(ink)
 
     def draw(self, name: str, context: bpy.types.Context, settings: Any, found: subject.Subject) -> None:
         """Draw one overlay in the scene."""
@@ -47,9 +47,16 @@ class Overlays:
             case "joint_weights" if chosen is not None and chosen.joint >= 0:
                 self.joint_weights.draw(found, chosen)
 
-    def entries(self, context: bpy.types.Context, settings: Any, found: subject.Subject) -> list[legend.Entry]:
-        """What the legend explains, from below."""
-        chosen, entries = self.choice.read(context, found), []
+    def entries(self, context: bpy.types.Context, settings: Any, found: subject.Subject) -> list[legend.Entry | str]:
+        """What the legend explains, from below: weights that are shown, and why nothing is."""
+        chosen = self.choice.read(context, found)
+        entries: list[legend.Entry | str] = []
+        if settings.fade and next(self.cages.hidden(found, context.space_data), None) is None:
+            entries.append("Fading Cages: hide the cages first")
+        if chosen is None and settings.weights:
+            entries.append("Weights: select cage vertices or a bone")
+        if settings.joint_weights and (chosen is None or chosen.joint < 0):
+            entries.append("Joint Weights: choose a bone in Pose Mode")
         if chosen is not None and settings.joint_weights and chosen.joint >= 0:
             weights = self.joint_weights.weights(found, chosen)
             low, high = float(weights.min()), float(weights.max())
@@ -78,8 +85,12 @@ _running = _Running()
 
 def draw_view() -> None:
     """In the scene, after Blender's own drawing of it."""
+    _guarded(NAMES, _draw_view)
+
+
+def _draw_view() -> None:
+    _look_after()
     context = bpy.context
-    _guarded(NAMES, _look_after)
     settings, found = _shown(context)
     for name in NAMES:
         if found is not None and getattr(settings, name):
@@ -88,22 +99,27 @@ def draw_view() -> None:
 
 def draw_pixels() -> None:
     """Over the picture: the legend."""
+    _guarded(("weights", "joint_weights", "fade"), _draw_pixels)
+
+
+def _draw_pixels() -> None:
     context = bpy.context
     settings, found = _shown(context)
-    if found is not None and (settings.weights or settings.joint_weights):
-        _guarded(
-            ("weights", "joint_weights"),
-            lambda: legend.draw(context, _running.kept().entries(context, settings, found)),
-        )
+    if found is not None:
+        legend.draw(context, _running.kept().entries(context, settings, found))
 
 
 def draw_cursor(place: tuple[int, int]) -> None:
     """At the mouse cursor, over the finished picture of the view that it is in."""
+    _guarded(("fade",), lambda: _draw_cursor(place))
+
+
+def _draw_cursor(place: tuple[int, int]) -> None:
     context = bpy.context
     settings, found = _shown(context)
     if found is not None and settings.fade and context.region_data is not None:
         radius = settings.fade_radius * context.preferences.system.ui_scale
-        _guarded(("fade",), lambda: _running.kept().cages.draw_near(found, context, place, radius))
+        _running.kept().cages.draw_near(found, context, place, radius)
 
 
 def _shown(context: bpy.types.Context) -> tuple[Any, subject.Subject | None]:

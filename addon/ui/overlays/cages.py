@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...adapters import drawing
 from . import colours, shaders, subject
 from .kept import Kept
-from .shaders import Fade, Pen, Strokes
+from .shaders import Fade, Ink, Pen, Strokes
 from .subject import Subject
 
 EDGE, VERTEX = 1.6, 6.0  # widths in pixels
@@ -29,7 +29,8 @@ Key = tuple[object, ...]
 class Cages:
     """The hidden rest and posed cages of the rigs on one armature."""
 
-    def __init__(self) -> None:
+    def __init__(self, ink: Ink) -> None:
+        self._ink = ink
         self._edges: dict[int, Kept[NDArray[np.int64]]] = {}
         self._strokes: dict[int, Kept[Strokes]] = {}
         self._pens: dict[int, Pen] = {}
@@ -63,7 +64,7 @@ class Cages:
         """Everywhere, in the 3D View's own drawing."""
         shaders.over(in_front=True)
         for obj, strokes, key in self.hidden(found, space):
-            self._pen(obj).draw(strokes, key, shaders.to_screen(obj.matrix_world), alpha=alpha)
+            self._pen(obj).draw(strokes, key, shaders.to_screen(found.placed(obj)), alpha=alpha)
 
     def draw_near(self, found: Subject, context: bpy.types.Context, cursor: tuple[int, int], radius: float) -> None:
         """Near the cursor (a place in the window), in the drawing of cursors, which is of the whole window."""
@@ -81,7 +82,7 @@ class Cages:
         )
         fade = Fade((cursor[0] - left - 0.5 * width, cursor[1] - bottom - 0.5 * height), radius)
         for obj, strokes, key in self.hidden(found, context.space_data):
-            self._pen(obj).draw(strokes, key, shift @ scale @ view @ obj.matrix_world, fade=fade)
+            self._pen(obj).draw(strokes, key, shift @ scale @ view @ found.placed(obj), fade=fade)
 
     def _pen(self, obj: bpy.types.Object) -> Pen:
-        return self._pens.setdefault(obj.session_uid, Pen())
+        return self._pens.setdefault(obj.session_uid, Pen(self._ink))

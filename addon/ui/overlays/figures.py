@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...adapters import armature
 from . import colours, shaders
 from .kept import Kept
-from .shaders import Pen, Strokes
+from .shaders import Ink, Pen, Strokes
 from .subject import Chosen, Subject
 from .surfaces import Surface, Surfaces
 
@@ -24,9 +23,9 @@ HOLD = 1.5  # lines from a joint to the vertices that move it
 class Joints:
     """The refit joints and bones as the pose has them, and where the animation's own are."""
 
-    def __init__(self) -> None:
+    def __init__(self, ink: Ink) -> None:
         self._strokes: Kept[Strokes] = Kept("joints")
-        self._pen = Pen()
+        self._pen = Pen(ink)
 
     def strokes(self, subject: Subject) -> Strokes:
         """In the armature's space."""
@@ -34,7 +33,7 @@ class Joints:
 
     def draw(self, subject: Subject, *, in_front: bool) -> None:
         shaders.over(in_front=in_front)
-        matrix = shaders.to_screen(subject.cage.cage_rig.armature.matrix_world)
+        matrix = shaders.to_screen(subject.placed(subject.cage.cage_rig.armature))
         self._pen.draw(self.strokes(subject), subject.state, matrix)
 
 
@@ -79,33 +78,39 @@ def _animated_heads(subject: Subject) -> NDArray[np.float64]:
 class Anchors:
     """Dots on the skins at the vertices that the posed cage is fitted to."""
 
-    def __init__(self, surfaces: Surfaces) -> None:
-        self._surfaces = surfaces
+    def __init__(self, surfaces: Surfaces, ink: Ink) -> None:
+        self._surfaces, self._ink = surfaces, ink
         self._anchors: Kept[list[NDArray[np.int64]]] = Kept("anchors")
+        self._strokes: dict[int, Kept[Strokes]] = {}
         self._pens: dict[int, Pen] = {}
 
     def on(self, subject: Subject, space: bpy.types.SpaceView3D | None = None) -> list[tuple[Surface, Strokes]]:
         """In each skin's own space."""
         anchors = self._anchors.get(subject.session, subject.session.anchors)
-        return [
-            (surface, shaders.dots(surface.points[anchors[surface.index]], colours.ANCHOR, ANCHOR))
-            for surface in self._surfaces.shown(subject, space)
-        ]
+        found = []
+        for surface in self._surfaces.shown(subject, space):
+            kept = self._strokes.setdefault(surface.index, Kept("anchor_dots"))
+            found.append((surface, kept.get(surface.state, lambda at=surface: _anchors(at, anchors[at.index]))))
+        return found
 
     def draw(self, subject: Subject, space: bpy.types.SpaceView3D) -> None:
         shaders.over(in_front=False)
         for surface, strokes in self.on(subject, space):
-            pen = self._pens.setdefault(surface.index, Pen())
+            pen = self._pens.setdefault(surface.index, Pen(self._ink))
             pen.draw(strokes, surface.state, shaders.to_screen(surface.to_world, 4.0 * surface.offset))
+
+
+def _anchors(surface: Surface, vertices: NDArray[np.int64]) -> Strokes:
+    return shaders.dots(surface.points[vertices], colours.ANCHOR, ANCHOR)
 
 
 class JointWeights:
     """How much each vertex of the posed cage moves the active bone's joint: a dot on it, and a line from the joint."""
 
-    def __init__(self) -> None:
+    def __init__(self, ink: Ink) -> None:
         self._weights: Kept[NDArray[np.float64]] = Kept("joint_coords")
         self._strokes: Kept[Strokes] = Kept("joint_weights")
-        self._pen = Pen()
+        self._pen = Pen(ink)
 
     def weights(self, subject: Subject, chosen: Chosen) -> NDArray[np.float64]:
         """The joint's row of Ψ, `#C`."""
@@ -131,9 +136,5 @@ class JointWeights:
 
     def draw(self, subject: Subject, chosen: Chosen) -> None:
         shaders.over(in_front=True)
-        matrix = shaders.to_screen(_posed_cage_matrix(subject))
+        matrix = shaders.to_screen(subject.placed(subject.cage.cage_rig.posed_cage))
         self._pen.draw(self.strokes(subject, chosen), (*subject.state, chosen), matrix)
-
-
-def _posed_cage_matrix(subject: Subject) -> Matrix:
-    return subject.cage.cage_rig.posed_cage.matrix_world

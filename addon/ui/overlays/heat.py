@@ -83,9 +83,9 @@ class HeatMap:
             column = session.skin_weights(chosen.joint)
         else:
             coords = self._coords.get(session, session.cage_coords)
-            column = coords[:, chosen.vertices[0]].copy()
-            for vertex in chosen.vertices[1:]:
-                column += coords[:, vertex]
+            one = np.zeros(coords.shape[1], np.float32)
+            one[list(chosen.vertices)] = 1.0
+            column = coords @ one
         parts = np.split(column, session.starts[1:-1])
         weights = [part if mask is None else part * mask for part, mask in zip(parts, masks, strict=True)]
         return _Column(weights, masks)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The legend of weights: a small bar of colours with its numbers, in the lower right corner of the 3D View."""
+"""The legend in the lower right corner of the 3D View: bars of colours with numbers, and what to do to see more."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gpu_extras.batch import batch_for_shader
 
 from . import colours
 
-WIDTH, BAR, PAD, GAP, TEXT = 170.0, 9.0, 9.0, 6.0, 11.0  # in units of the interface
+WIDTH, BAR, PAD, GAP, TEXT, MARGIN = 170.0, 9.0, 9.0, 6.0, 11.0, 12.0  # in units of the interface
 BACK = (0.09, 0.09, 0.09, 0.78)
 FONT = 0
 
@@ -59,29 +59,34 @@ def corner(context: bpy.types.Context) -> tuple[float, float]:
     return float(right), float(bottom)
 
 
-def draw(context: bpy.types.Context, entries: list[Entry]) -> None:
-    """Draw the bars above one another."""
+def draw(context: bpy.types.Context, entries: list[Entry | str]) -> None:
+    """Draw them above one another, where there is room."""
     unit = context.preferences.system.ui_scale
     right, bottom = corner(context)
-    left, bottom = right - (WIDTH + 12.0) * unit, bottom + 12.0 * unit
+    right, bottom = right - MARGIN * unit, bottom + MARGIN * unit
+    if right < (WIDTH + MARGIN) * unit:
+        return
+    blf.size(FONT, TEXT * unit)
+    blf.color(FONT, 0.93, 0.93, 0.93, 1.0)
     for entry in entries:
-        _draw_one(entry, left, bottom, unit)
-        bottom += _height() * unit + GAP * unit
+        draw_one = _draw_text if isinstance(entry, str) else _draw_bar
+        bottom += draw_one(entry, right, bottom, unit) + GAP * unit
 
 
-def _height() -> float:
-    return 2 * PAD + 2 * TEXT + BAR + 2 * GAP
+def _draw_text(text: str, right: float, bottom: float, unit: float) -> float:
+    width, height = _length(text) + 2 * PAD * unit, (2 * PAD + TEXT) * unit
+    _rectangle(right - width, bottom, width, height, BACK)
+    _text(text, right - width + PAD * unit, bottom + PAD * unit)
+    return height
 
 
-def _draw_one(entry: Entry, left: float, bottom: float, unit: float) -> None:
-    gpu.state.blend_set("ALPHA")
-    _rectangle(left, bottom, WIDTH * unit, _height() * unit, BACK)
+def _draw_bar(entry: Entry, right: float, bottom: float, unit: float) -> float:
+    left, height = right - WIDTH * unit, (2 * PAD + 2 * TEXT + BAR + 2 * GAP) * unit
+    _rectangle(left, bottom, WIDTH * unit, height, BACK)
     inner, width = left + PAD * unit, (WIDTH - 2 * PAD) * unit
     y = bottom + (PAD + TEXT + GAP) * unit
     _bar(entry, inner, y, width, BAR * unit)
     zero = (0.0 - entry.low) / (entry.high - entry.low) if entry.high > entry.low else 0.0
-    blf.size(FONT, TEXT * unit)
-    blf.color(FONT, 0.93, 0.93, 0.93, 1.0)
     low = bottom + PAD * unit
     if entry.low == entry.high:
         _text("moves nothing", inner, low)
@@ -91,6 +96,7 @@ def _draw_one(entry: Entry, left: float, bottom: float, unit: float) -> None:
         if 0.2 < zero < 0.8:
             _text("0", inner + zero * width - 0.5 * _length("0"), low)
     _text(_fitted(entry.label, width), inner, y + (BAR + GAP) * unit)
+    return height
 
 
 def _fitted(label: str, width: float) -> str:
@@ -112,6 +118,7 @@ def _rectangle(x: float, y: float, width: float, height: float, colour: colours.
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     corners = [(x, y), (x + width, y), (x, y + height), (x + width, y + height)]
     shader.uniform_float("color", colour)
+    gpu.state.blend_set("ALPHA")  # drawing text leaves it off
     batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
 
 

@@ -117,12 +117,22 @@ def dots(
     return lines(points, points, colour, width)
 
 
+class Ink:
+    """The shader of all strokes, made when first needed."""
+
+    def __init__(self) -> None:
+        self._shader: Kept[gpu.types.GPUShader] = Kept("shader")
+
+    def shader(self) -> gpu.types.GPUShader:
+        return self._shader.get(True, _stroke_shader)
+
+
 class Pen:
     """Draws one set of strokes; sends them to the graphics card when they have changed."""
 
-    def __init__(self) -> None:
-        self._batch: Kept[gpu.types.GPUBatch | None] = Kept("batch")
-        self._shader: Kept[gpu.types.GPUShader] = Kept("shader")
+    def __init__(self, ink: Ink) -> None:
+        self._ink = ink
+        self._batch: Kept[gpu.types.GPUBatch] = Kept("batch")
 
     def draw(
         self, strokes: Strokes, key: tuple[object, ...], matrix: Matrix, *, alpha: float = 1.0, fade: Fade | None = None
@@ -130,7 +140,7 @@ class Pen:
         """Draw them; `key` changes with them, and `matrix` brings their space to the screen."""
         if not len(strokes.start):
             return
-        shader = self._shader.get(True, _stroke_shader)
+        shader = self._ink.shader()
         batch = self._batch.get(key, lambda: _batch(strokes))
         _, _, width, height = gpu.state.viewport_get()
         scale = bpy.context.preferences.system.ui_scale

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import bpy
+from mathutils import Matrix
 
 from ... import registry, sync
 from ...adapters import drawing
@@ -28,6 +29,10 @@ class Subject:
     def state(self) -> tuple[object, ...]:
         """Changes whenever anything that is shown of the rig may have."""
         return self.session, self.session.revision, events.count()
+
+    def placed(self, obj: bpy.types.Object) -> Matrix:
+        """The matrix of an object of the rig to the world, also where it is hidden."""
+        return obj.evaluated_get(self.depsgraph).matrix_world
 
 
 @dataclass(frozen=True)

@@ -47,14 +47,14 @@ class Surfaces:
 
     def shown(self, subject: Subject, space: bpy.types.SpaceView3D | None) -> Iterator[Surface]:
         """The rig's skins that are visible (in this view) and not in Edit Mode."""
-        bones = subject.cage.cage_rig.armature.matrix_world
+        bones = subject.placed(subject.cage.cage_rig.armature)
         for index, obj in health.live_skins(subject.cage):
             if obj.data.is_editmode or not obj.visible_get(viewport=space):
                 continue
             state = (*subject.state, obj.session_uid)
             kept = self._points.setdefault(index, Kept("points"))
             found = kept.get(state, lambda index=index, obj=obj: _read(subject, index, obj))
-            to_world = bones if found.in_rig_space else obj.matrix_world
+            to_world = bones if found.in_rig_space else subject.placed(obj)
             offset = max(NEAR * subject.session.size, 0.25 * found.spacing) * max(to_world.to_scale())
             yield Surface(index, obj, found.points, to_world, offset, state)
 
