@@ -38,8 +38,9 @@ def stage(wheel: Path, platform: str, folder: Path) -> None:
     (folder / "wheels").mkdir()
     shutil.copy(wheel, folder / "wheels")
     shutil.copy(ROOT / "LICENSE", folder)
-    with (folder / "blender_manifest.toml").open("a") as manifest:
-        manifest.write(f'\nplatforms = ["{platform}"]\nwheels = ["./wheels/{wheel.name}"]\n')
+    manifest = folder / "blender_manifest.toml"
+    # before the first table, where every key still is the manifest's own
+    manifest.write_text(f'platforms = ["{platform}"]\nwheels = ["./wheels/{wheel.name}"]\n' + manifest.read_text())
 
 
 def run_builder(builder: Path, *arguments: str) -> None:
