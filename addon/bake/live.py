@@ -111,12 +111,13 @@ def playing(cage: bpy.types.Object, first: float) -> Iterator[Callable[[float], 
         scene.frame_set(whole, subframe=time - whole)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         refuse_paused(cage, time)
-        for obj in objects:
+        for obj in participants:
             if not obj.evaluated_get(depsgraph).is_evaluated:
                 raise BakeError(f"'{obj.name}' is hidden at frame {time:g}, so that Blender does not evaluate it")
         return depsgraph
 
     objects = [skin.obj for skin in skins_of(cage)]
+    participants = [*objects, *rigs(cage), cage.cage_rig.armature]
     with shown(objects):
         try:
             go(first)  # what modifiers before ours do can be read from the second time on

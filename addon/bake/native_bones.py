@@ -126,4 +126,4 @@ def _key_object(keys: Keys, obj: bpy.types.Object, seen: Recording) -> None:
         setattr(obj, path, values[0, first:end])
         if np.ptp(values[:, first:end], axis=0).any():
             for k in range(first, end):
-                keys.add(path, k - first, seen.times, values[:, k])
+                keys.add(path, k - first, seen.times, values[:, k], group="Object Transforms")

@@ -14,8 +14,8 @@ from ..bake import mesh_cache, native_rig, scenes, shape_keys
 # Numbers never move: they are what keymaps and presets store.
 TARGETS = [
     ("MESH_CACHE", "Mesh Cache", "Point caches (PC2), one a skin, for Blender's Mesh Cache modifier and others", 0),
-    ("ALEMBIC", "Alembic", "The skins as they are seen, by Blender's Alembic exporter", 1),
-    ("USD", "USD", "The skins as they are seen, by Blender's USD exporter", 2),
+    ("ALEMBIC", "Alembic", "The skins as they are seen, by Blender's exporter, which can't be cancelled on its way", 1),
+    ("USD", "USD", "The skins as they are seen, by Blender's exporter, which can't be cancelled on its way", 2),
     ("SHAPE_KEYS", "Shape Keys", "Copies of the skins with a shape key every frame, which FBX and glTF can hold", 3),
     ("NATIVE_RIG", "Native Rig", "Copies of skins and armature that play alike by Blender's Armature modifier", 4),
 ]
