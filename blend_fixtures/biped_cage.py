@@ -26,14 +26,23 @@ _ORDER = list(_TRUNK)
 
 def biped_cage() -> Cage:
     """The cage around both skins, faces outward."""
+    return _half().mirrored()
+
+
+def biped_loops() -> dict[str, list[int]]:
+    """Its loops of vertices by name: around the trunk as in `_TRUNK`, around limbs as "wrist.L"."""
+    return _half().mirrored_loops()
+
+
+def _half() -> _Half:
     half = _Half()
-    trunk = [half.trunk_ring(*_TRUNK[name]) for name in _ORDER]
+    trunk = [half.trunk_ring(name, *_TRUNK[name]) for name in _ORDER]
     for low, high in pairwise(trunk):
         half.join_trunk(low, high, gap=low is trunk[_ORDER.index("armpit")])
     half.faces.append(trunk[-1])
     _add_arm(half, trunk[_ORDER.index("armpit")], trunk[_ORDER.index("shoulder")])
     _add_leg(half, trunk[0])
-    return half.mirrored()
+    return half
 
 
 def fat_cage(cage: Cage) -> Array:
@@ -83,14 +92,16 @@ class _Half:
     def __init__(self) -> None:
         self.vertices: list[Array] = []
         self.faces: list[list[int]] = []
+        self.loops: dict[str, list[int]] = {}
 
     def add(self, points: Array) -> list[int]:
         start = len(self.vertices)
         self.vertices.extend(np.asarray(points, float))
         return list(range(start, start + len(points)))
 
-    def trunk_ring(self, z: float, x: float, front: float, back: float, bulge: float) -> list[int]:
-        return self.add([(0.0, front - bulge, z), (x, front, z), (x, back, z), (0.0, back + bulge, z)])
+    def trunk_ring(self, name: str, z: float, x: float, front: float, back: float, bulge: float) -> list[int]:
+        self.loops[name] = self.add([(0.0, front - bulge, z), (x, front, z), (x, back, z), (0.0, back + bulge, z)])
+        return self.loops[name]
 
     def join_trunk(self, low: list[int], high: list[int], *, gap: bool) -> None:
         """Quads between two trunk rings; `gap` leaves the side open for the arm."""
@@ -106,12 +117,28 @@ class _Half:
 
     def mirrored(self) -> Cage:
         """The whole cage: middle vertices shared, the others mirrored."""
-        points = np.array(self.vertices)
-        other = np.arange(len(points))
-        sided = points[:, 0] > 0.0
-        other[sided] = len(points) + np.arange(sided.sum())
+        points, (sided, other) = np.array(self.vertices), self._twins()
         vertices = np.concatenate([points, points[sided] * [-1.0, 1.0, 1.0]])
         return Cage(vertices, self.faces + [[int(other[v]) for v in reversed(face)] for face in self.faces])
+
+    def mirrored_loops(self) -> dict[str, list[int]]:
+        """The loops of the whole cage: the trunk's closed, a limb's on both sides."""
+        _, other = self._twins()
+        whole = {}
+        for name, loop in self.loops.items():
+            twin = [int(other[v]) for v in loop]
+            if name in _TRUNK:
+                whole[name] = [*loop, *sorted(set(twin) - set(loop))]
+            else:
+                whole[f"{name}.L"], whole[f"{name}.R"] = loop, twin
+        return whole
+
+    def _twins(self) -> tuple[Array, Array]:
+        """Which vertices are off the middle, and the number of each one's mirror image."""
+        sided = np.array(self.vertices)[:, 0] > 0.0
+        other = np.arange(len(sided))
+        other[sided] = len(sided) + np.arange(sided.sum())
+        return sided, other
 
 
 def _add_arm(half: _Half, low: list[int], high: list[int]) -> None:
@@ -120,14 +147,14 @@ def _add_arm(half: _Half, low: list[int], high: list[int]) -> None:
     upper, lower = ELBOW - SHOULDER, WRIST - ELBOW
     bend = upper / np.linalg.norm(upper) + lower / np.linalg.norm(lower)
     sections = [
-        (ELBOW - 0.17 * upper, upper, 0.115, 0.122),
-        (ELBOW + 0.20 * lower, bend, 0.105, 0.108),
-        (hand_point(-0.012, 0.0), HAND_ALONG, 0.100, 0.094),
+        ("elbow", ELBOW - 0.17 * upper, upper, 0.115, 0.122),
+        ("forearm", ELBOW + 0.20 * lower, bend, 0.105, 0.108),
+        ("wrist", hand_point(-0.012, 0.0), HAND_ALONG, 0.100, 0.094),
     ]
-    for center, axis, deep, tall in sections:
-        ring = _next_loop(half, ring, _section(center, axis, deep=(deep, deep), tall=tall))
-    ring = _next_loop(half, ring, _hand_section(0.088, front=0.152, rear=0.092, back=0.056, palm=0.078))
-    ring = _next_loop(half, ring, _hand_section(0.224, front=0.092, rear=0.092, back=0.044, palm=0.086))
+    for name, center, axis, deep, tall in sections:
+        ring = _next_loop(half, name, ring, _section(center, axis, deep=(deep, deep), tall=tall))
+    ring = _next_loop(half, "knuckles", ring, _hand_section(0.088, front=0.152, rear=0.092, back=0.056, palm=0.078))
+    ring = _next_loop(half, "tips", ring, _hand_section(0.224, front=0.092, rear=0.092, back=0.044, palm=0.086))
     half.faces.append(ring)
 
 
@@ -149,8 +176,8 @@ def _hand_section(along: float, *, front: float, rear: float, back: float, palm:
     return np.array([origin + a * HAND_FRONT + b * HAND_BACK for a, b in corners])
 
 
-def _next_loop(half: _Half, ring: list[int], points: Array) -> list[int]:
-    new = half.add(points)
+def _next_loop(half: _Half, name: str, ring: list[int], points: Array) -> list[int]:
+    half.loops[name] = new = half.add(points)
     half.join_loop(ring, new)
     return new
 
@@ -159,14 +186,13 @@ def _add_leg(half: _Half, hip: list[int]) -> None:
     """Leg below half of the lowest trunk ring: knee (two loops), ankle, and a foot with heel, toe top and toe sole."""
     ring = [hip[0], hip[3], hip[2], hip[1]]
     loops = [
-        (0.470, 0.006, 0.225, -0.118, 0.120),
-        (0.350, 0.008, 0.226, -0.118, 0.128),
-        (0.160, 0.012, 0.230, -0.112, 0.135),
+        ("above knee", 0.470, 0.006, 0.225, -0.118, 0.120),
+        ("below knee", 0.350, 0.008, 0.226, -0.118, 0.128),
+        ("ankle", 0.160, 0.012, 0.230, -0.112, 0.135),
     ]
-    for z, inner, outer, front, back in loops:
-        ring = _next_loop(
-            half, ring, np.array([(inner, front, z), (inner, back, z), (outer, back, z), (outer, front, z)])
-        )
+    for name, z, inner, outer, front, back in loops:
+        section = np.array([(inner, front, z), (inner, back, z), (outer, back, z), (outer, front, z)])
+        ring = _next_loop(half, name, ring, section)
     inner_front, inner_back, outer_back, outer_front = ring
     heel_in, heel_out, toe_in, toe_out, sole_in, sole_out = half.add(
         [

@@ -4,7 +4,7 @@ vertex.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,12 +14,18 @@ from .surface_nets import neighbour_mean, neighbour_table
 INFLUENCES = 4
 
 
-def part_weights(part: Part, bones: Sequence[Bone], *, power: float = 6.0, rounds: int = 8) -> Array:
-    """Weights of one part over all `bones` (#V by #J, rows sum to 1); only `part.bones` get any."""
+def part_weights(
+    part: Part, bones: Sequence[Bone], *, girth: Mapping[str, float] | None = None, power: float = 6.0, rounds: int = 8
+) -> Array:
+    """Weights of one part over all `bones` (#V by #J, rows sum to 1); only `part.bones` get any.
+
+    `girth`: how much thicker than others the limb around a bone is; its bone reaches as much farther.
+    """
     names = [bone.name for bone in bones]
     columns = [names.index(name) for name in part.bones]
     weights = np.zeros((len(part.vertices), len(bones)))
     distances = np.stack([segment_distance(part.vertices, bones[j].head, bones[j].tail) for j in columns], axis=1)
+    distances /= [(girth or {}).get(name, 1.0) for name in part.bones]
     nearest = distances.min(axis=1, keepdims=True)
     local = ((nearest + 1e-4) / (distances + 1e-4)) ** power
     local /= local.sum(axis=1, keepdims=True)

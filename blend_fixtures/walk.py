@@ -1,7 +1,4 @@
-"""A 48-frame walk in place for the biped: feet by two-bone IK in the hips' frame, the rest from sines of the phase.
-
-Rotations are written as they act in armature axes on the rest pose, and turned into bone channels at the end.
-"""
+"""A 48-frame walk in place for the biped: feet by two-bone IK in the hips' frame, the rest from sines of the phase."""
 
 from __future__ import annotations
 
@@ -10,14 +7,12 @@ import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
 from .biped_skeleton import FINGERS, HAND_ALONG, HAND_BACK
+from .posing import Pose, key_hips, key_rotation, reflect, turn
 
 FRAMES = 48
 KEY_STEP = 2
 _STRIDE = 0.22
 _STANCE = 0.56
-_AXES = {"x": Vector((1, 0, 0)), "y": Vector((0, 1, 0)), "z": Vector((0, 0, 1))}
-
-Pose = dict[str, Matrix]
 
 
 def add_walk(armature: bpy.types.Object, name: str = "walk") -> bpy.types.Action:
@@ -26,10 +21,8 @@ def add_walk(armature: bpy.types.Object, name: str = "walk") -> bpy.types.Action
     for frame in range(1, FRAMES + 2, KEY_STEP):
         rotations, hips = walk_pose(armature, 2.0 * np.pi * (frame - 1) / FRAMES)
         for bone_name, rotation in rotations.items():
-            _key_rotation(armature.pose.bones[bone_name], rotation, frame=frame, previous=previous)
-        bone = armature.pose.bones["hips"]
-        bone.location = bone.bone.matrix_local.to_3x3().inverted() @ hips
-        bone.keyframe_insert("location", frame=frame, group="hips")
+            key_rotation(armature.pose.bones[bone_name], rotation, frame=frame, previous=previous)
+        key_hips(armature, hips, frame=frame)
     action = armature.animation_data.action
     action.name = name
     action.use_frame_range, action.frame_start, action.frame_end, action.use_cyclic = True, 1, FRAMES, True
@@ -42,16 +35,16 @@ def walk_pose(armature: bpy.types.Object, phase: float) -> tuple[Pose, Vector]:
     """Rotations by bone (armature axes, relative to the parent) and the hips' offset (metres) at `phase` (radians)."""
     c, s = np.cos(phase), np.sin(phase)
     hips_offset = Vector((0.022 * s, 0.0, -0.027 - 0.016 * np.cos(2.0 * phase - 0.4)))
-    hips = _turn("z", -9.0 * c) @ _turn("y", -4.0 * s) @ _turn("x", 3.0)
+    hips = turn("z", -9.0 * c) @ turn("y", -4.0 * s) @ turn("x", 3.0)
     pose: Pose = {"hips": hips}
     for bone_name in ("spine.001", "spine.002", "chest"):
-        pose[bone_name] = _turn("z", 6.0 * c) @ _turn("y", 2.2 * s) @ _turn("x", 1.2 + 1.0 * np.cos(2.0 * phase - 0.8))
-    pose["neck"] = _turn("z", -4.0 * c) @ _turn("x", -3.0 - 1.5 * np.cos(2.0 * phase - 1.2))
-    pose["head"] = _turn("z", -4.0 * c) @ _turn("y", -2.5 * s) @ _turn("x", -2.0 - 2.0 * np.cos(2.0 * phase - 1.6))
+        pose[bone_name] = turn("z", 6.0 * c) @ turn("y", 2.2 * s) @ turn("x", 1.2 + 1.0 * np.cos(2.0 * phase - 0.8))
+    pose["neck"] = turn("z", -4.0 * c) @ turn("x", -3.0 - 1.5 * np.cos(2.0 * phase - 1.2))
+    pose["head"] = turn("z", -4.0 * c) @ turn("y", -2.5 * s) @ turn("x", -2.0 - 2.0 * np.cos(2.0 * phase - 1.6))
     for side, shift in (("L", 0.0), ("R", np.pi)):
-        frame = (hips if side == "L" else _reflect(hips), _side_offset(hips_offset, side))
+        frame = (hips if side == "L" else reflect(hips), _side_offset(hips_offset, side))
         for bone_name, rotation in {**_arm(phase + shift), **_leg(armature, phase + shift, *frame)}.items():
-            pose[f"{bone_name}.{side}"] = rotation if side == "L" else _reflect(rotation)
+            pose[f"{bone_name}.{side}"] = rotation if side == "L" else reflect(rotation)
     return pose, hips_offset
 
 
@@ -61,8 +54,8 @@ def _arm(phase: float) -> Pose:
     arm = (HAND_ALONG * [1.0, 0.0, 1.0]) / np.linalg.norm(HAND_ALONG[[0, 2]])
     hinge = Vector(np.cross(arm, [0.0, -1.0, 0.0]))
     pose = {
-        "clavicle": _turn("z", 5.0 * c) @ _turn("y", -2.0),
-        "upper_arm": _turn("x", 34.0 * c - 2.0) @ _turn("y", 17.0 + 3.0 * np.cos(2.0 * phase)),
+        "clavicle": turn("z", 5.0 * c) @ turn("y", -2.0),
+        "upper_arm": turn("x", 34.0 * c - 2.0) @ turn("y", 17.0 + 3.0 * np.cos(2.0 * phase)),
         "forearm": Matrix.Rotation(np.radians(40.0 - 22.0 * late), 3, hinge),
         "hand": Matrix.Rotation(np.radians(4.0 - 10.0 * np.cos(phase - 1.0)), 3, hinge),
     }
@@ -100,7 +93,7 @@ def _leg(armature: bpy.types.Object, phase: float, hips: Matrix, offset: Vector)
     hip, knee, ankle, ball = (bones[name].head_local.copy() for name in ("thigh.L", "shin.L", "foot.L", "toe.L"))
     pivot = bones["hips"].head_local
     forward, lift, pitch = _foot(phase)
-    roll = _turn("x", np.degrees(pitch))
+    roll = turn("x", np.degrees(pitch))
     target = ball + Vector((0.0, -forward, lift)) + roll @ (ankle - ball)
     reach = hips.inverted() @ (target - (pivot + offset + hips @ (hip - pivot)))
     thigh, shin = (knee - hip).yz, (ankle - knee).yz
@@ -114,28 +107,7 @@ def _leg(armature: bpy.types.Object, phase: float, hips: Matrix, offset: Vector)
     tilt = hips.to_euler("ZYX").x
     toe = max(pitch, 0.0) * (0.85 if (phase / (2 * np.pi)) % 1.0 < _STANCE else 0.3)
     angles = {"thigh": upper, "shin": lower - upper, "foot": pitch - tilt - lower, "toe": -toe}
-    return {bone_name: _turn("x", np.degrees(angle)) for bone_name, angle in angles.items()}
-
-
-def _key_rotation(bone: bpy.types.PoseBone, rotation: Matrix, *, frame: int, previous: dict[str, Quaternion]) -> None:
-    rest = bone.bone.matrix_local.to_3x3()
-    turn = (rest.inverted() @ rotation @ rest).to_quaternion()
-    if bone.name in previous:
-        turn.make_compatible(previous[bone.name])
-    previous[bone.name] = turn
-    bone.rotation_mode = "QUATERNION"
-    bone.rotation_quaternion = turn
-    bone.keyframe_insert("rotation_quaternion", frame=frame, group=bone.name)
-
-
-def _turn(axis: str, degrees: float) -> Matrix:
-    return Matrix.Rotation(np.radians(degrees), 3, _AXES[axis])
-
-
-def _reflect(rotation: Matrix) -> Matrix:
-    """The mirror image in x of a rotation."""
-    flip = Matrix.Diagonal((-1.0, 1.0, 1.0))
-    return flip @ rotation @ flip
+    return {bone_name: turn("x", np.degrees(angle)) for bone_name, angle in angles.items()}
 
 
 def _side_offset(offset: Vector, side: str) -> Vector:
