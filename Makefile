@@ -1,4 +1,4 @@
-# make demo · test · lint · bench · fixtures · extension · test-matrix
+# make demo · test · lint · bench · fixtures · extension · test-matrix · docs · pictures
 # Every target sets up what it needs in .venv; nothing but Python, a Rust toolchain and make is assumed.
 
 PYTHON ?= $(shell sh tools/find-python)
@@ -8,7 +8,7 @@ CORE_SOURCES := $(shell find rust_core -name '*.rs' -o -name '*.toml' -o -name '
 ADDON_SOURCES := $(shell find addon -name '*.py' -o -name '*.toml')
 DEMO_OUT ?= build/demo
 
-.PHONY: demo test test-rust test-python lint bench fixtures extension test-matrix test-window clean
+.PHONY: demo test test-rust test-python lint bench fixtures extension test-matrix test-window docs pictures clean
 
 demo: $(VENV)/.extension
 	$(PY) tools/with_extension.py demo/demo.py --out $(DEMO_OUT) $(if $(QUICK),--quick) \
@@ -44,6 +44,13 @@ test-matrix: $(VENV)/.extension
 test-window: $(VENV)/.extension
 	$(PY) tests/window/run.py
 
+docs: $(VENV)/.docs
+	$(PY) -m sphinx --builder html --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs build/docs/html
+	@echo "build/docs/html/index.html"
+
+pictures: $(VENV)/.extension
+	$(PY) docs/make_pictures/make_pictures.py
+
 $(VENV)/.dev: pyproject.toml
 	@test -n "$(PYTHON)" || { sh tools/find-python; exit 1; }
 	$(PYTHON) -m venv $(VENV)
@@ -53,6 +60,10 @@ $(VENV)/.dev: pyproject.toml
 
 $(VENV)/.blender: $(VENV)/.dev
 	$(PY) -m pip install --quiet --group blender
+	touch $@
+
+$(VENV)/.docs: $(VENV)/.dev
+	$(PY) -m pip install --quiet --group docs
 	touch $@
 
 $(VENV)/.core: $(VENV)/.dev $(CORE_SOURCES)
