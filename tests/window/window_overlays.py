@@ -310,10 +310,12 @@ def failure(package: object) -> Iterator[float | None]:
     draw = package.Joints.draw
     package.Joints.draw = lambda *_, **__: 1 / 0
     settings().joints = True
-    yield 2 * LOOK
+    for _ in range(20):  # the view has to be drawn, and Blender to come back to its timers
+        yield 0.2 if settings().joints else None
     driver.check("an overlay that fails is switched off", not settings().joints and settings().fade)
     driver.check("and says so", "ZeroDivisionError" in settings().message, settings().message)
     package.Joints.draw = draw
+    picture("11_switched_off")
 
 
 driver.perform(acts())
