@@ -72,8 +72,8 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
         self._fill_in(context)
         self.by_hand = True
         if self.target not in SUFFIXES:
-            title = f"Bake to {self.bl_rna.properties['target'].enum_items[self.target].name}"
-            return context.window_manager.invoke_props_dialog(self, title=title, confirm_text="Bake")
+            name = next(name for target, name, *_ in TARGETS if target == self.target)
+            return context.window_manager.invoke_props_dialog(self, title=f"Bake to {name}", confirm_text="Bake")
         name = bpy.path.clean_name(props.rig_of(context.object).name)
         self.filepath = self.filepath or bpy.path.abspath(f"//{name}{SUFFIXES[self.target][0]}")
         self.filter_glob = ";".join(f"*{suffix}" for suffix in SUFFIXES[self.target])

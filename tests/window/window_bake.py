@@ -31,6 +31,11 @@ def counts() -> list[int]:
     return [len(getattr(bpy.data, kind)) for kind in kinds]
 
 
+def rest_cage() -> list[float]:
+    mesh = bpy.data.objects["BipedCage"].data
+    return [x for block in mesh.shape_keys.key_blocks for point in block.points for x in point.co]
+
+
 def confirm_files() -> Iterator[float | None]:
     """Press the file browser's button."""
     area = next(area for area in driver.window().screen.areas if area.type == "FILE_BROWSER")
@@ -62,11 +67,13 @@ def acts() -> Iterator[float | None]:
     bpy.ops.cage_rig.bind()
     bpy.ops.ed.undo_push(message="Bound")
     yield 0.5
-    count = len(rig.skins)
+    count, before = len(rig.skins), rest_cage()
     yield from a_dialog_and_escape()
     yield from to_the_end(count)
     yield from a_native_rig()
     yield from files(count)
+    cage = bpy.data.objects["BipedCage"]
+    driver.check("the rig is as it was", rest_cage() == before and cage.cage_rig.state == "LIVE", cage.cage_rig.message)
 
 
 def a_dialog_and_escape() -> Iterator[float | None]:
