@@ -284,7 +284,7 @@ def bake() -> Acts:
     x, y = driver.centre()
     driver.move((x - 150, y + 60))
     yield from settle()
-    stage.picture("bake_dialog", (x - 385, y - 175, x + 55, y + 65))
+    stage.picture("bake_dialog", (x - 300, y - 145, x + 50, y + 60))
     driver.key("ESC")
     yield LOOK
 
