@@ -82,11 +82,11 @@ def rigs(cage: bpy.types.Object) -> list[bpy.types.Object]:
 
 def skins_of(cage: bpy.types.Object) -> list[Skin]:
     """The character's skins that were not deleted."""
-    found: dict[str, Skin] = {}
+    found: dict[int, Skin] = {}
     for rig in rigs(cage):
         for index, obj in health.live_skins(rig):
-            if obj.name not in found or obj.cage_rig.owner == rig:
-                found[obj.name] = Skin(obj, rig, index)
+            if obj.session_uid not in found or obj.cage_rig.owner == rig:
+                found[obj.session_uid] = Skin(obj, rig, index)
     return list(found.values())
 
 
