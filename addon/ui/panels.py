@@ -85,8 +85,7 @@ class _Overlays:
     def draw(self, context: bpy.types.Context) -> None:
         overlays = context.workspace.cage_rig_overlays
         column = self.layout.column(align=True)
-        if overlays.message:
-            column.label(text=overlays.message, icon="ERROR")
+        _draw_text(column, overlays.message, context.region.width)
         for name, options in (
             ("weights", ("weights_opacity",)),
             ("joint_weights", ()),
@@ -143,12 +142,17 @@ def _draw_state(layout: bpy.types.UILayout, cage: bpy.types.Object, width: int) 
     row = box.row()
     row.alert = settings.state == "PAUSED"
     row.label(text=f"{cage.name}: {settings.state.title()}", icon=ICONS.get(settings.state, "QUESTION"))
-    scale = bpy.context.preferences.system.ui_scale
-    for line in textwrap.wrap(settings.message, max(20, int((width - 60 * scale) / (6.6 * scale)))):
-        box.label(text=line)
+    _draw_text(box, settings.message, width)
     if settings.fix:
         box.separator()
         box.operator("cage_rig.fix_problem", text=repair.label(settings.fix), icon="TOOL_SETTINGS")
+
+
+def _draw_text(layout: bpy.types.UILayout, text: str, width: int) -> None:
+    """A sentence over as many lines as it needs; labels do not wrap."""
+    scale = bpy.context.preferences.system.ui_scale
+    for line in textwrap.wrap(text, max(20, int((width - 60 * scale) / (6.6 * scale)))) if text else ():
+        layout.label(text=line)
 
 
 def _draw_keys(layout: bpy.types.UILayout, cage: bpy.types.Object, frame: float) -> None:
