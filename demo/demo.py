@@ -1,5 +1,5 @@
 """Runs the main job of Cage Rig on a character and shows it: a .blend with the rig live, a picture, a baked Alembic;
-and a picture of the skinning methods on an arm.
+a picture of the skinning methods on an arm; cage keys beside a punch and a walk, as a picture, a film and a .blend.
 
 python tools/with_extension.py demo/demo.py --out DIR [--quick] [--rig FILE] [--cage FILE]
 """
@@ -15,11 +15,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from showcase import acting, coupling, figures, load_rig, methods, methods_picture, picture
+from showcase import acting, coupling, figures, film, keys, keys_picture, load_rig, methods, methods_picture, picture
 from showcase.bars import bar_figures, bound_bar
 from showcase.stages import Stages
 
 from blend_fixtures.build import RigObjects, build_biped
+from blend_fixtures.punch import STRIKE
 
 BAR_PLACE = (2.8, 0.0, 0.28)
 VIEW = np.radians(-32.0)
@@ -50,7 +51,7 @@ def main() -> None:
     written = ["demo.png", "demo.blend", "demo.abc"]
     if not args.rig:
         _methods(stages, folder / "methods.png", quick=args.quick)
-        written.insert(1, "methods.png")
+        written[1:1] = ["methods.png", "keys.png", "keys.blend", _keys(stages, folder, quick=args.quick)]
     stages.total()
     print("see", ", ".join(str(folder / name) for name in written))
 
@@ -148,6 +149,25 @@ def _methods(stages: Stages, path: Path, *, quick: bool) -> None:
             notes.extend(rows[-1].elbow.facts())
     with stages.stage("picture of the methods"):
         methods_picture.draw_methods(path, rows, quick=quick)
+
+
+def _keys(stages: Stages, folder: Path, *, quick: bool) -> str:
+    """Cage keys beside a punch and a walk, in a file of their own; returns the film's name."""
+    with stages.stage("key punch and walk") as notes:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        stage = film.build_stage()
+        left, right = film.places(stage)
+        acts = [keys.punch_act(left), keys.walk_act(right)]
+        strips = [keys.strip(act) for act in acts]
+        film.dress(stage, acts)
+        notes.extend(f"{act.name.lower()}: cage keys at {', '.join(f'{k:g}' for k in act.cage_keys())}" for act in acts)
+    with stages.stage("picture of the keys"):
+        keys_picture.draw_keys(folder / "keys.png", strips, quick=quick)
+    with stages.stage("film of the keys") as notes:
+        shot = film.shoot(stage, folder, quick=quick)
+        notes.append(shot.name)
+    film.save(folder / "keys.blend", frame=STRIKE)
+    return str(shot.relative_to(folder))
 
 
 def _summary(rig: RigObjects) -> str:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import bmesh
 import bpy
+import numpy as np
 
 from blend_fixtures.build import RigObjects
+
+from .figures import Array
 
 
 def bind(rig: RigObjects) -> None:
@@ -45,6 +51,23 @@ def use_method(rig: RigObjects, identifier: str) -> None:
     """Choose the skinning method; the skins follow in the same update."""
     rig.cage.cage_rig.method = identifier
     bpy.context.view_layer.update()
+
+
+def edit_posed_cage(rig: RigObjects, change: Callable[[Array], Array]) -> None:
+    """Move the posed cage's vertices (#C by 3, its own space) in Edit Mode; the rest cage and the skins follow."""
+    cage = posed_cage(rig)
+    cage.hide_set(False)
+    bpy.context.view_layer.objects.active = cage
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(cage.data)
+    points = np.array([vertex.co for vertex in edited.verts])
+    for vertex, place in zip(edited.verts, change(points).tolist(), strict=True):
+        vertex.co = place
+    bmesh.update_edit_mesh(cage.data)
+    bpy.context.view_layer.update()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = None
+    require_live(rig)
 
 
 def is_available() -> bool:

@@ -44,15 +44,28 @@ def seen_height(figure: Figure, turn: Matrix) -> float:
     return float((high - low)[2] + 0.12 * (high - low)[1])
 
 
-def place(studio: Studio, figure: Figure, turn: Matrix, *, slot: Slot, scale: float) -> None:
-    """Stand the figure on the slot's floor line, and draw its cage and bones over it."""
+def place(
+    studio: Studio,
+    figure: Figure,
+    turn: Matrix,
+    *,
+    slot: Slot,
+    scale: float,
+    origin: Vector | None = None,
+    line: float = 1.0,
+) -> None:
+    """Stand the figure on the slot's floor line, and draw its cage and bones over it.
+
+    `origin`: the turned figure's point that comes onto the middle of that line; None: below its middle. `line`: how
+    bold the cage is.
+    """
     low, high = extent(figure, turn)
     skin_low = min(float((mesh_points(mesh) @ np.array(turn.to_3x3()).T)[:, 2].min()) for mesh in figure.meshes)
     middle = Vector((0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), skin_low))
     matrix = (
         Matrix.Translation(studio.on_plane(slot.x, slot.floor + slot.hover))
         @ Matrix.Scale(scale, 4)
-        @ Matrix.Translation(-middle)
+        @ Matrix.Translation(-(middle if origin is None else origin))
         @ turn
     )
     for mesh in figure.meshes:
@@ -60,7 +73,7 @@ def place(studio: Studio, figure: Figure, turn: Matrix, *, slot: Slot, scale: fl
     if figure.cage_vertices is not None:
         vertices = to_world(figure.cage_vertices, matrix)
         vertices[:, 2] = np.maximum(vertices[:, 2], studio.on_plane(slot.x, slot.floor).z + 0.02)
-        _add_cage(studio, vertices, figure.cage_faces)
+        _add_cage(studio, vertices, figure.cage_faces, line=line)
     if figure.bones is not None:
         size = float(np.linalg.norm(high - low))
         vertices, faces = drawing.octahedra(figure.bones, limit=0.02 * size)
@@ -76,7 +89,7 @@ def add_lines(
     *,
     surface: bpy.types.Material,
     matrix: Matrix | None = None,
-) -> None:
+) -> bpy.types.Object:
     """Add a mesh that is drawn, but throws no shadow and lights nothing."""
     mesh = bpy.data.meshes.new(name)
     rows = faces.tolist() if isinstance(faces, np.ndarray) else faces
@@ -84,13 +97,14 @@ def add_lines(
     mesh.materials.append(surface)
     made = studio.add_mesh(mesh, matrix=matrix, shadow=False)
     made.visible_diffuse = made.visible_glossy = False
+    return made
 
 
-def _add_cage(studio: Studio, vertices: Array, faces: list[list[int]]) -> None:
+def _add_cage(studio: Studio, vertices: Array, faces: list[list[int]], *, line: float) -> None:
     """Draw a cage (world space; what lies below the floor was lifted onto it) as tubes, knots and a thin film."""
-    line = flat_material("Cage Lines", CAGE_BLUE)
-    thin = min(1.0, (130.0 / len(faces)) ** 0.5)
+    ink = flat_material("Cage Lines", CAGE_BLUE)
+    thin = line * min(1.0, (130.0 / len(faces)) ** 0.5)
     for drawn in (drawing.tubes(vertices, faces, radius=thin * 0.011), drawing.knots(vertices, radius=thin * 0.030)):
-        add_lines(studio, "Cage", *drawn, surface=line)
+        add_lines(studio, "Cage", *drawn, surface=ink)
     film = glass_material("Cage Film", (0.10, 0.34, 0.95), opacity=0.075)
     add_lines(studio, "Cage Film", vertices, faces, surface=film)

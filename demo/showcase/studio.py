@@ -12,12 +12,18 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from blend_fixtures.materials import material
+from blend_fixtures.materials import PALETTE, material
 
 Array = np.ndarray
 
 TILT = np.radians(9.0)
 PIXELS_PER_UNIT = 100
+SUNS = (  # direction, strength in W/m², angle in radians
+    ((0.55, 0.85, -1.15), 2.5, 0.35),
+    ((-0.9, 0.15, -0.55), 0.7, 0.6),
+    ((-0.2, -1.0, -0.45), 1.0, 0.5),
+)
+SKY, SKY_STRENGTH = (0.88, 0.93, 1.0), 0.62
 INK = (0.035, 0.045, 0.065)
 
 
@@ -85,9 +91,8 @@ class Studio:
     def render(self, path: Path, quality: Quality) -> Array:
         """Render by way of `path`; returns display values over a floor of 1 (height by width by 3, top row first)."""
         scene = self.scene
-        _cycles(scene, quality)
-        scene.render.resolution_x = round(self.width * PIXELS_PER_UNIT * quality.scale)
-        scene.render.resolution_y = round(self.height * PIXELS_PER_UNIT * quality.scale)
+        self.set_up(quality)
+        scene.render.image_settings.file_format = "PNG"
         scene.render.filepath = str(path)
         bpy.ops.render.render(write_still=True, scene=scene.name)
         image = bpy.data.images.load(str(path))
@@ -100,6 +105,19 @@ class Studio:
         corner = colors[:4, : max(4, colors.shape[1] // 32)]
         return np.minimum(colors / np.median(corner, axis=(0, 1)), 1.0)
 
+    def set_up(self, quality: Quality) -> None:
+        """Choose how the scene is rendered."""
+        _cycles(self.scene, quality)
+        self.scene.render.resolution_x = round(self.width * PIXELS_PER_UNIT * quality.scale)
+        self.scene.render.resolution_y = round(self.height * PIXELS_PER_UNIT * quality.scale)
+
+    def whiten_floor(self) -> None:
+        """Let the floor come out white, for renders that `render` does not scale."""
+        view = self.scene.view_settings
+        view.use_curve_mapping = True
+        view.curve_mapping.white_level = _floor_light()
+        view.curve_mapping.update()
+
     def _camera(self) -> None:
         camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
         camera.data.type, camera.data.ortho_scale = "ORTHO", max(self.width, self.height)
@@ -110,11 +128,7 @@ class Studio:
         self.scene.camera = camera
 
     def _light(self) -> None:
-        for direction, strength, angle in (
-            ((0.55, 0.85, -1.15), 2.5, 0.35),
-            ((-0.9, 0.15, -0.55), 0.7, 0.6),
-            ((-0.2, -1.0, -0.45), 1.0, 0.5),
-        ):
+        for direction, strength, angle in SUNS:
             lamp = bpy.data.lights.new("Sun", "SUN")
             lamp.energy, lamp.angle = strength, angle
             made = bpy.data.objects.new("Sun", lamp)
@@ -124,8 +138,8 @@ class Studio:
         if world.node_tree is None:
             world.use_nodes = True
         background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-        background.inputs["Color"].default_value = (0.88, 0.93, 1.0, 1.0)
-        background.inputs["Strength"].default_value = 0.62
+        background.inputs["Color"].default_value = (*SKY, 1.0)
+        background.inputs["Strength"].default_value = SKY_STRENGTH
         self.scene.world = world
 
 
@@ -180,6 +194,13 @@ def attribute_material(name: str, *, roughness: float) -> bpy.types.Material:
     return made
 
 
+def _floor_light() -> tuple[float, float, float]:
+    """The light that comes from the empty floor (linear RGB)."""
+    suns = sum(strength * Vector(direction).normalized().z for direction, strength, _ in SUNS)
+    albedo = PALETTE["Floor"][0]
+    return tuple(a * (SKY_STRENGTH * sky - suns / np.pi) for a, sky in zip(albedo, SKY, strict=True))
+
+
 def _cycles(scene: bpy.types.Scene, quality: Quality) -> None:
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
@@ -194,6 +215,5 @@ def _cycles(scene: bpy.types.Scene, quality: Quality) -> None:
     scene.cycles.diffuse_bounces = 1
     scene.cycles.glossy_bounces = 1
     scene.cycles.transparent_max_bounces = 12
-    scene.render.image_settings.file_format = "PNG"
     scene.render.image_settings.color_mode = "RGB"
     scene.view_settings.view_transform = "Standard"
