@@ -11,7 +11,6 @@ from mathutils import Matrix
 
 from .keys import Act
 from .placing import CAGE_BLUE, add_lines
-from .sheet import GREY
 from .studio import Quality, Studio, flat_material
 from .timeline import BONE_GREY, DEPTH, Ruler, add_lane, add_stretch
 
@@ -19,7 +18,7 @@ WIDTH, HEIGHT, FLOOR = 8.0, 3.0, -0.65  # metres
 FRAMES, RATE = 48, 24
 PLACES = ((-3.00, 60.0), (-1.10, 60.0), (1.45, 50.0), (3.15, 50.0))  # from left to right, and turned by degrees
 STEP, QUICK_STEP = 2, 12  # from one frame of the film to the next
-FULL, QUICK = Quality(scale=0.7, samples=2, guided=True), Quality(scale=0.4, samples=2, guided=True)
+FULL, QUICK = Quality(scale=0.8, samples=2, guided=True), Quality(scale=0.4, samples=2, guided=True)
 CAPTIONS = ("bones alone", "with cage keys")
 
 
@@ -49,7 +48,7 @@ def dress(studio: Studio, acts: Sequence[Act]) -> None:
     for k, act in enumerate(acts):
         stands = PLACES[2 * k : 2 * k + 2]
         for (x, _), caption in zip(stands, CAPTIONS, strict=True):
-            studio.add_label(caption, x=x, y=FLOOR - 0.26, size=0.15)
+            studio.add_label(caption, x=x, y=FLOOR - 0.25, size=0.18)
         left, right = stands[0][0] - 0.45, stands[1][0] + 0.55
         ruler = Ruler(left - (right - left) / FRAMES, (right - left) / FRAMES, (1, FRAMES))
         _add_sheet(studio, act, ruler)
@@ -75,7 +74,8 @@ def shoot(studio: Studio, folder: Path, *, quick: bool) -> Path:
 
 
 def save(path: Path, *, frame: int) -> None:
-    """Save the stage, at `frame` and ready to be played or rendered."""
+    """Save the stage, at `frame` and ready to be played or rendered, and nothing else."""
+    bpy.data.orphans_purge(do_recursive=True)
     bpy.context.scene.frame_set(frame)
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
 
@@ -91,12 +91,12 @@ def _choose_film(scene: bpy.types.Scene) -> None:
 
 
 def _add_sheet(studio: Studio, act: Act, ruler: Ruler) -> None:
-    bones, cage = FLOOR - 0.50, FLOOR - 0.68
+    bones, cage = FLOOR - 0.51, FLOOR - 0.70
     for name, keys, y, color in (
         ("bones", act.bone_keys(), bones, BONE_GREY),
         ("cage", act.cage_keys(), cage, CAGE_BLUE),
     ):
-        studio.add_label(name, x=ruler.at(0) - 0.06, y=y, size=0.12, color=GREY, align="RIGHT")
+        studio.add_label(name, x=ruler.at(0) - 0.06, y=y, size=0.15, color=color, align="RIGHT")
         add_lane(studio, ruler, [frame for frame in keys if frame <= FRAMES], y=y, color=color, size=0.045)
     add_stretch(studio, ruler, act.cage_keys(), y=cage)
     reach = 0.5 * (bones - cage) + 0.09

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from blend_fixtures import punch, walk
+from blend_fixtures.biped import biped
 from blend_fixtures.biped_cage import biped_loops
-from blend_fixtures.build import RigObjects, build_biped
+from blend_fixtures.build import RigObjects, build_character
+from blend_fixtures.parts import Character
 
 from . import acting, coupling
 from .figures import Array, Figure, freeze
@@ -124,7 +126,7 @@ def _act(
     moved: Sequence[int],
     places: tuple[Matrix, Matrix],
 ) -> Act:
-    rig = build_biped(walk=False)
+    rig = build_character(_character())
     add_action(rig.armature)
     plain = _twin(rig)
     plain.armature.matrix_world = places[0]
@@ -135,6 +137,11 @@ def _act(
     bpy.context.view_layer.update()
     coupling.bind(rig)
     return Act(name, plain, rig, list(shown), moved)
+
+
+@cache
+def _character() -> Character:
+    return biped()
 
 
 def _twin(rig: RigObjects) -> RigObjects:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -17,7 +17,7 @@ from .sheet import GREY, WIDTH, Card, compose, fade_foot, fade_sides, save_png
 from .studio import QUICK, Quality, Studio
 from .timeline import BONE_GREY, Ruler, add_frames, add_lane, add_stretch
 
-HEAD, ROW, SHEET, FOOT, GAP = 1.14, 2.62, 2.80, 0.10, 0.16
+HEAD, ROW, SHEET, FOOT, GAP = 1.14, 2.62, 2.86, 0.10, 0.16
 GUTTER, COLUMN = -7.45, 2.24  # left of the words; from frame to frame
 FIRST = -4.72  # the middle of the first frame
 SCALE, KEY_SCALE = 1.22, 0.82  # units a metre
@@ -54,7 +54,7 @@ WORDS = {
 
 def draw_keys(path: Path, strips: Sequence[Strip], *, quick: bool) -> None:
     """Render the picture to `path`."""
-    quality = QUICK if quick else Quality(samples=4)
+    quality = replace(QUICK, samples=2) if quick else Quality(samples=4)
     scratch = path.with_name("panel.png")
     images, cards = [_rendered(_head_panel(), scratch, quality)], []
     unit = images[0].shape[1] / WIDTH
@@ -104,7 +104,7 @@ def _row(strip: Strip, *, keyed: bool) -> Studio:
 def _sheet(strip: Strip) -> Studio:
     """The time line, with the cage keys under it."""
     studio = Studio(f"{strip.act.name} sheet", width=WIDTH, height=SHEET)
-    floor = 0.38 - 0.5 * SHEET
+    floor = 0.44 - 0.5 * SHEET
     ruler = _add_lines(studio, strip, y=0.5 * SHEET - 0.16)
     matrix = strip.act.rig.armature.matrix_world
     turn = Matrix.Rotation(np.radians(KEY_TURN), 4, "Z") @ matrix.to_3x3().to_4x4().inverted()

@@ -13,6 +13,7 @@ import pytest
 from mathutils import Matrix
 from scene import Points, shown
 
+from blend_fixtures.build import build_biped
 from blend_fixtures.punch import KEYS, STRIKE, add_punch
 from blend_fixtures.walk import add_walk
 
@@ -82,7 +83,7 @@ def breadth(points: Points) -> float:
 
 
 def test_the_bones_action_is_unchanged_by_the_cage_keys(keys: ModuleType, act: object) -> None:
-    untouched = keys.build_biped(walk=False).armature
+    untouched = build_biped(walk=False).armature
     add_punch(untouched)
     assert act.bone_keys() == list(KEYS)
     assert written(act.rig.armature) == written(untouched) == written(act.plain.armature)
@@ -138,7 +139,7 @@ def test_the_walk_grows_stout_and_thin_again(keys: ModuleType) -> None:
     (first, stout, fat, last) = (keyed / plain for plain, keyed in girth.values())
     assert first == pytest.approx(1.0, abs=1e-4) == last
     assert 1.02 < stout < fat - 0.02
-    untouched = keys.build_biped(walk=False).armature
+    untouched = build_biped(walk=False).armature
     add_walk(untouched)
     assert written(act.rig.armature) == written(untouched)
 
