@@ -17,8 +17,12 @@ from .posing import Pose, key_hips, key_rotation, placed, reach, reflect, turn
 FRAMES = 24
 STRIKE = 13
 _FEET = {"L": ((0.125, -0.170), -8.0), "R": ((-0.150, 0.185), -48.0)}  # the ankle's place, the foot's turn
-_FOLD = Vector(np.cross(HAND_ALONG, -HAND_BACK))
-_BESIDE = Vector(np.cross(HAND_FRONT, HAND_ALONG))
+# The left hand's fist: fingers fold to the palm; the thumb rolls before it and lies down over them.
+_CURLS, _FOLD = (72.0, 82.0, 60.0), Vector(np.cross(HAND_ALONG, -HAND_BACK))
+_ROLL, _BESIDE = Vector(np.cross(HAND_FRONT, -HAND_BACK)), Vector(np.cross(HAND_FRONT, HAND_ALONG))
+_THUMB = [
+    Matrix.Rotation(np.radians(angle), 3, axis) for angle, axis in ((70.0, _ROLL), (50.0, _BESIDE), (50.0, _BESIDE))
+]
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ _STRIKE = _Body(
     heel=34.0,
 )
 _FOLLOW = replace(_STRIKE, hips=(0.03, -0.130, -0.085), twist=(28.0, 50.0), right=(0.06, -1.2, 1.08), heel=38.0)
-KEYS = {1: _GUARD, 9: _WOUND, STRIKE: _STRIKE, 16: _FOLLOW, 23: _GUARD}
+KEYS = {1: _GUARD, 9: _WOUND, STRIKE: _STRIKE, 16: _FOLLOW, 22: _GUARD}
 
 
 def add_punch(armature: bpy.types.Object, name: str = "punch") -> bpy.types.Action:
@@ -101,10 +105,8 @@ def _arm(armature: bpy.types.Object, pose: Pose, side: str, hips: Vector, wrist:
     turns = reach(joints, Vector((0.0, 1.0, 0.0)), shoulder, wrist, elbow)
     made = {names[0]: clavicle.inverted() @ turns["upper"], names[1]: turns["upper"].inverted() @ turns["lower"]}
     for finger in FINGERS:
-        for joint, curl in enumerate((12.0, 10.0, 25.0) if finger == "thumb" else (72.0, 82.0, 60.0)):
-            fold = Matrix.Rotation(np.radians(curl), 3, _FOLD)
-            if finger == "thumb":
-                fold = fold @ Matrix.Rotation(np.radians((38.0, 22.0, 22.0)[joint]), 3, _BESIDE)
+        for joint in range(3):
+            fold = _THUMB[joint] if finger == "thumb" else Matrix.Rotation(np.radians(_CURLS[joint]), 3, _FOLD)
             made[f"{finger}.{joint + 1:02d}.{side}"] = fold if side == "L" else reflect(fold)
     return made
 
