@@ -4,23 +4,18 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import binding, health, layers, props, sync
-from .adapters import armature, modifier, positions, shape_keys, snapshot, stack, vertex_groups
-from .session import Known, Session, SessionError, SkinSnapshot, Snapshot
+from . import binding, layers, props, reading, sync
+from .adapters import armature, modifier, positions, shape_keys, snapshot, stack
+from .reading import BindError
+from .session import Known, Session, SessionError, Snapshot
 
 Matrix = NDArray[np.float64]
-
-
-class BindError(Exception):
-    """The selection can't be bound; the message is a sentence for the artist. Nothing was changed."""
 
 
 @dataclass(frozen=True)
@@ -276,28 +271,11 @@ def _read(
     armature_object: bpy.types.Object,
     skins: list[bpy.types.Object],
 ) -> _Bound:
-    rest = armature.read_rest(armature_object.data)
-    if not rest.names:
-        raise BindError(f"Armature '{armature_object.name}' has no bones")
-    deforming = {name: k for k, name in enumerate(rest.names) if rest.deform[k]}
-    with _at_rest(context, armature_object):
-        world = armature.to_array(armature_object.matrix_world)
-        to_rig = [_to_rig(obj, world, armature_object.name) for obj in (*skins, cage)]
-    parts = [_read_skin(obj, deforming, matrix) for obj, matrix in zip(skins, to_rig, strict=False)]
-    _refuse_bones(armature_object, rest, parts)
-    for obj in skins:
-        unlike = stack.unlike_weights(obj, armature_object)
-        if unlike:
-            raise BindError(f"'{obj.name}' can't be bound: {unlike}")
-        blocking = stack.blocking(obj, stack.place(obj, armature_object))
-        if blocking:
-            raise BindError(
-                f"Modifier '{blocking}' of '{obj.name}' may change the vertices before the Armature modifier; "
-                "apply it or move it after"
-            )
+    found = reading.read(context, armature_object, skins, cage)
+    rest, to_rig = found.rest, found.to_rig
     cage_points = positions.apply_matrix(to_rig[-1], positions.read_base(cage.data))
     core = Snapshot(
-        parts,
+        found.skins,
         rest.heads.astype(np.float32).astype(np.float64),
         rest.tails.astype(np.float32).astype(np.float64),
         rest.parents,
@@ -306,45 +284,6 @@ def _read(
         cage.cage_rig.method.lower(),
     )
     return _Bound(core, rest.names, to_rig[:-1], to_rig[-1])
-
-
-def _to_rig(obj: bpy.types.Object, armature_world: Matrix, armature_name: str) -> Matrix:
-    world = armature.to_array(obj.matrix_world)
-    for name, matrix in ((armature_name, armature_world), (obj.name, world)):
-        scales = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-        if scales[2] <= 1e-6 * scales[0]:
-            raise BindError(f"'{name}' is scaled to nothing along an axis; give it a scale")
-    # through float32: what a file keeps
-    return (np.linalg.inv(armature_world) @ world).astype(np.float32).astype(np.float64)
-
-
-def _read_skin(obj: bpy.types.Object, deforming: dict[str, int], to_rig: Matrix) -> SkinSnapshot:
-    mesh = obj.data
-    if mesh.library is None and mesh.users - mesh.use_fake_user > 1:
-        raise BindError(f"The mesh of '{obj.name}' is shared with another object; make it single-user first")
-    if not mesh.polygons:
-        raise BindError(f"'{obj.name}' has no faces, so it can't be a skin")
-    indptr, joints, values = vertex_groups.read_weights(obj, deforming)
-    if not len(joints):
-        raise BindError(
-            f"'{obj.name}' has no weights: none of its vertex groups is named as a deforming bone; "
-            "parent it to the armature with automatic weights, or paint some"
-        )
-    values = values.astype(np.float32).astype(np.float64)
-    points = positions.apply_matrix(to_rig, positions.read_base(mesh))
-    return SkinSnapshot(points, positions.read_faces(mesh), (indptr, joints, values))
-
-
-def _refuse_bones(obj: bpy.types.Object, rest: armature.RestBones, skins: list[SkinSnapshot]) -> None:
-    used = np.unique(np.concatenate([skin.weights[1] for skin in skins]))
-    for bone in used.tolist():
-        if rest.segments[bone] > 1:
-            raise BindError(health.bendy(obj, rest.names[bone]))
-        if rest.envelopes[bone]:
-            raise BindError(
-                f"Bone '{rest.names[bone]}' of '{obj.name}' multiplies weights by its envelope; "
-                "switch that off (Bone properties, Deform)"
-            )
 
 
 def _compute(cage: bpy.types.Object, bound: _Bound) -> Session:
@@ -437,23 +376,6 @@ def _attach(context: bpy.types.Context, obj: bpy.types.Object, cage: bpy.types.O
     if not obj.users_collection:
         collections = cage.users_collection or (context.scene.collection,)
         collections[0].objects.link(obj)
-
-
-@contextmanager
-def _at_rest(context: bpy.types.Context, armature_object: bpy.types.Object) -> Iterator[None]:
-    """The armature in rest position, so that what hangs on its bones is where it was made."""
-    data = armature_object.data
-    before = data.pose_position
-    if before == "REST":
-        yield
-        return
-    data.pose_position = "REST"
-    context.view_layer.update()
-    try:
-        yield
-    finally:
-        data.pose_position = before
-        context.view_layer.update()
 
 
 def _remove_mesh(mesh: bpy.types.Mesh | None) -> None:

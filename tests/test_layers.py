@@ -26,7 +26,8 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
     "sync": ({"bpy", "numpy"}, {"adapters", "binding", "health", "layers", "linked", "registry", "session", "skins"}),
-    "lifecycle": ({"bpy", "numpy"}, {"adapters", "binding", "health", "layers", "props", "session", "sync"}),
+    "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
+    "lifecycle": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "props", "reading", "session", "sync"}),
     "bake": (
         {"bpy", "mathutils", "numpy", "pathlib", "struct"},
         {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
