@@ -269,9 +269,9 @@ class Session:
             self._posed_cage = (self.revision, self.rig.posed_cage.astype(np.float32))
         return self._posed_cage[1]
 
-    def cage_coords(self) -> NDArray[np.float32]:
-        """How much each cage vertex moves each skin vertex, `#M by #C` over all skins: Φ, a large copy."""
-        return np.asarray(self.rig.cage_coords, np.float32)
+    def cage_influence(self, vertices: Sequence[int]) -> NDArray[np.float32]:
+        """How much these cage vertices move each skin vertex together, `#M` over all skins."""
+        return self.rig.cage_influence(vertices)
 
     def joint_coords(self, joint: int) -> Matrices:
         """How much each cage vertex moves this joint, `#C`: its row of Ψ."""

@@ -12,8 +12,8 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from blend_fixtures.bar import bar
-from blend_fixtures.build import RigObjects, build_character
+from blend_fixtures.bar import bar, box_cage
+from blend_fixtures.build import RigObjects, add_cage, build_character
 
 Points = NDArray[np.float32]
 
@@ -70,6 +70,18 @@ def build_bar() -> RigObjects:
 
 def bound_bar() -> Rig:
     return bind(build_bar())
+
+
+def small_cage(name: str = "HandCage") -> bpy.types.Object:
+    """A cage around the end of the bar alone."""
+    return add_cage(name, box_cage([0.45, 0.8, 1.15], half=0.3))
+
+
+def partly_caged() -> Rig:
+    """The bar, bound to a cage around its end."""
+    objects = build_bar()
+    bpy.data.objects.remove(objects.cage)
+    return bind(RigObjects(objects.skins, objects.armature, small_cage()))
 
 
 def update() -> None:

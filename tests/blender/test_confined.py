@@ -12,7 +12,6 @@ from scene import (
     Points,
     Rig,
     bend,
-    bind,
     build_bar,
     drag,
     edited,
@@ -21,21 +20,15 @@ from scene import (
     fresh,
     leave_edit_mode,
     native,
+    partly_caged,
     rest,
     select,
     set_mesh,
     shown,
+    small_cage,
     update,
 )
 from test_sync import assert_rendered, key_the_bar
-
-from blend_fixtures.bar import box_cage
-from blend_fixtures.build import RigObjects, add_cage
-
-
-def small_cage(name: str = "HandCage") -> bpy.types.Object:
-    """A cage around the end of the bar alone."""
-    return add_cage(name, box_cage([0.45, 0.8, 1.15], half=0.3))
 
 
 def bind_small(rig: Rig, name: str = "HandCage") -> Rig:
@@ -63,12 +56,6 @@ def ramp(rig: Rig) -> Points:
 
 
 # Partial cages
-
-
-def partly_caged() -> Rig:
-    objects = build_bar()
-    bpy.data.objects.remove(objects.cage)
-    return bind(RigObjects(objects.skins, objects.armature, small_cage()))
 
 
 def test_a_partial_cage_moves_its_part_and_leaves_the_rest(capfd: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,19 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from scene import Rig, bend, enter_edit_mode, fat_key, leave_edit_mode, select, set_mesh, shown, update
+from scene import (
+    Rig,
+    bend,
+    enter_edit_mode,
+    fat_key,
+    leave_edit_mode,
+    partly_caged,
+    rest,
+    select,
+    set_mesh,
+    shown,
+    update,
+)
 
 HANDLERS = ("depsgraph_update_post", "frame_change_post", "undo_post", "redo_post", "load_pre")
 
@@ -190,6 +202,18 @@ def test_heat_of_a_masked_skin_is_what_the_cage_does_there(overlays: ModuleType,
     (found,) = heat(overlays, kept)
     assert np.allclose(found.weights, 0.25 * session(bar).rig.cage_coords[:, 5], atol=1e-6)
     leave_edit_mode()
+
+
+def test_heat_ends_where_a_partial_cage_ends(overlays: ModuleType, kept: object) -> None:
+    rig = partly_caged()
+    choose_vertices(rig.cage, range(len(rig.cage.data.vertices)))
+    (found,) = heat(overlays, kept)
+    leave_edit_mode()
+    before = shown(rig.skin).copy()
+    set_mesh(rig.cage, rest(rig.cage) + np.float32([0, 0, 0.5]))
+    moved = (shown(rig.skin) - before)[:, 2]
+    assert found.weights.min() == 0.0 and found.weights.max() > 0.999
+    assert np.allclose(found.weights, moved / 0.5, atol=1e-5)
 
 
 @pytest.mark.parametrize("part", ["armature", "refit"])

@@ -47,7 +47,6 @@ class HeatMap:
 
     def __init__(self, surfaces: Surfaces) -> None:
         self._surfaces = surfaces
-        self._coords: Kept[NDArray[np.float32]] = Kept("cage_coords")
         self._column: Kept[_Column] = Kept("weights")
         self._colours: dict[int, Kept[NDArray[np.float32]]] = {}
         self._indices: dict[int, Kept[gpu.types.GPUIndexBuf]] = {}
@@ -74,21 +73,14 @@ class HeatMap:
         return found
 
     def _weights(self, session: Session, chosen: Chosen) -> _Column:
-        masks = session.masks if chosen.joint < 0 else [None] * len(session.masks)
+        masks = session.masks if chosen.joint < 0 else []
         key = (session, chosen, tuple(id(mask) for mask in masks if mask is not None))
         return self._column.get(key, lambda: self._read(session, chosen, masks))
 
     def _read(self, session: Session, chosen: Chosen, masks: list[NDArray[np.float32] | None]) -> _Column:
-        if chosen.joint >= 0:
-            column = session.skin_weights(chosen.joint)
-        else:
-            coords = self._coords.get(session, session.cage_coords)
-            one = np.zeros(coords.shape[1], np.float32)
-            one[list(chosen.vertices)] = 1.0
-            column = coords @ one
-        parts = np.split(column, session.starts[1:-1])
-        weights = [part if mask is None else part * mask for part, mask in zip(parts, masks, strict=True)]
-        return _Column(weights, masks)
+        by_bone = chosen.joint >= 0
+        column = session.skin_weights(chosen.joint) if by_bone else session.cage_influence(chosen.vertices)
+        return _Column(np.split(column, session.starts[1:-1]), masks)
 
     def draw(self, heats: list[Heat]) -> None:
         """Draw on the skins, over what is seen of them."""

@@ -99,6 +99,8 @@ pub enum CageError {
     InsideOutPart { face: usize },
     #[error("the cage encloses no volume")]
     NoVolume,
+    #[error("there is no cage vertex {vertex}; the cage has {vertices} vertices")]
+    NoSuchVertex { vertex: i64, vertices: usize },
 }
 
 /// Why a mesh cannot serve as a skin.

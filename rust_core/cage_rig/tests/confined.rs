@@ -102,6 +102,30 @@ fn a_mask_confines_skin_and_joints_and_comes_off_without_a_trace() {
 }
 
 #[test]
+fn influence_is_what_the_skin_moves_by_in_the_rest_pose() {
+    for (fixture, masked) in [(bar(), false), (bar(), true), (partly_caged(), false), (partly_caged(), true)]
+    {
+        let mut rig = fixture.rig();
+        if masked {
+            rig.mask_skin(Some(&ramp(&fixture))).expect("a valid mask");
+        }
+        let chosen: Vec<usize> = (0..fixture.cage.len()).step_by(3).collect();
+        let influence =
+            rig.cage_influence(&chosen.iter().map(|&v| v as i64).collect::<Vec<_>>()).expect("cage vertices");
+        let mut cage = fixture.cage.clone();
+        chosen.iter().for_each(|&v| cage[v].y += 0.25);
+        rig.edit_rest_cage(&cage).expect("a valid cage");
+        let moved = displaced(&points(rig.rest_skin()), &fixture.skin);
+        assert!(influence.iter().any(|part| *part > 0.1));
+        for (step, part) in moved.iter().zip(&influence) {
+            assert!((step.y - 0.25 * f64::from(*part)).abs() < 2e-6, "{step} {part}");
+        }
+    }
+    let fault = bar().rig().cage_influence(&[0, 99]).expect_err("the cage has fewer vertices");
+    assert!(fault.to_string().starts_with("there is no cage vertex 99; the cage has "), "{fault}");
+}
+
+#[test]
 fn with_a_mask_the_posed_cage_still_lands_where_it_is_dragged() {
     let fixture = bar();
     let pose = lively_pose(&fixture, 0.9);

@@ -266,6 +266,17 @@ impl CoupledRig {
         arrays::from_rows(py, &self.with(py, |rig| rig.cage_coords().clone())?)
     }
 
+    /// How much some cage vertices move each skin vertex together (#M,), where the cage reaches and its mask lets it.
+    fn cage_influence<'py>(
+        &self,
+        py: Python<'py>,
+        vertices: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let vertices = arrays::integers(vertices, "vertices")?;
+        let influence = self.with(py, |rig| rig.cage_influence(&vertices))?.or_raise()?;
+        Ok(PyArray1::from_vec(py, influence))
+    }
+
     /// Joint coordinates (#J, #C), a copy.
     #[getter]
     fn joint_coords<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {

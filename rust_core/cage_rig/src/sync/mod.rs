@@ -35,7 +35,7 @@ pub use ground::Carried;
 pub use work::Work;
 
 use crate::cage::Cage;
-use crate::error::{Error, PoseError, SkinError};
+use crate::error::{CageError, Error, PoseError, SkinError};
 use crate::points::{bounding_diagonal, first_not_finite, Matrix3, Point, Transform};
 use crate::rows::Rows;
 use crate::skinning::{SkinningInput, SkinningMethod};
@@ -386,6 +386,23 @@ impl CoupledRig {
     /// Φ, `#M by #C`.
     pub fn cage_coords(&self) -> &Rows {
         &self.binding.cage_coords
+    }
+
+    /// How much the cage vertices `vertices` move each skin vertex together, `#M`: the sum of their
+    /// columns of Φ, where the cage reaches and its mask lets it. Wrong vertices: an error.
+    pub fn cage_influence(&self, vertices: &[i64]) -> Result<Vec<f32>, CageError> {
+        let columns = self.binding.cage.vertices().len();
+        let mut chosen = Vec::with_capacity(vertices.len());
+        for &vertex in vertices {
+            match usize::try_from(vertex).ok().filter(|v| *v < columns) {
+                Some(vertex) => chosen.push(vertex),
+                None => return Err(CageError::NoSuchVertex { vertex, vertices: columns }),
+            }
+        }
+        let (coords, mask) = (&self.binding.cage_coords, self.ground.mask());
+        let part = |i: usize| mask.map_or(1.0, |mask| f64::from(mask[i]));
+        let sum = |i: usize| chosen.iter().map(|&c| coords.row(i)[c]).sum::<f64>();
+        Ok((0..coords.len()).map(|i| (part(i) * sum(i)) as f32).collect())
     }
 
     /// Ψ, `#J by #C`.
