@@ -31,7 +31,7 @@ lint: $(VENV)/.core
 
 bench: $(VENV)/.extension
 	$(PY) tools/with_extension.py tests/bench/bench_blender.py
-	cargo bench --quiet -p cage_rig --bench skinning
+	cargo bench --quiet -p cage_rig --bench skinning --bench binding
 
 fixtures: $(VENV)/.blender
 	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures

@@ -18,9 +18,12 @@ Weights: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike, ArrayLike]
 
 __all__ = [
     "ArrayError",
+    "BindJob",
     "CageError",
     "CageRigError",
+    "Cancelled",
     "CoupledRig",
+    "MethodJob",
     "PanicException",
     "PoseError",
     "SkeletonError",
@@ -42,6 +45,9 @@ class WeightsError(CageRigError): ...
 class SkeletonError(CageRigError): ...
 class PoseError(CageRigError): ...
 class ArrayError(CageRigError): ...
+
+class Cancelled(Exception):
+    """A job was cancelled; nothing of it is left."""
 
 class PanicException(BaseException):
     """A bug in the core stopped a call; the rig that raised it refuses further calls."""
@@ -124,6 +130,7 @@ class CoupledRig:
         joints: ArrayLike | None,  # (#J, 3)
     ) -> None: ...  # what a lower cage has moved this rig's rest cage and joints by
     def set_method(self, name: str) -> None: ...  # at any time; changes the posed skin alone
+    def start_method(self, name: str) -> MethodJob: ...
     @property
     def method(self) -> str: ...
     def posed_skin_into(self, out: NDArray[Any], start: int = 0) -> None: ...
@@ -159,6 +166,63 @@ class CoupledRig:
     @property
     def work(self) -> Work: ...
     def _panic_for_tests(self) -> None: ...
+
+@final
+class BindJob:
+    """A bind in a thread of its own, begun at once; the rig equals CoupledRig(...) to the last bit.
+
+    Arguments are checked before it begins, and what they hold is copied. Dropping the job cancels it. A cancel takes
+    effect within some 50 ms, later where a cage has hundreds of vertices: their decompositions can't be interrupted.
+    """
+
+    def __new__(
+        cls,
+        skin_vertices: ArrayLike,  # (#M, 3)
+        skin_faces: Faces,
+        skin_weights: Weights,  # normalised at bind; a row without weights is not moved by the skeleton
+        joints: ArrayLike,  # (#J, 3)
+        parents: ArrayLike,  # (#J,), -1 = root, any order
+        cage_vertices: ArrayLike,  # (#C, 3)
+        cage_faces: Faces,
+        *,
+        method: str = "lbs",  # one of skinning_methods()
+        coordinates: str = "mean_value",
+        anchors: ArrayLike | None = None,  # (min(#M, #C),) skin vertices
+        cage_coords: ArrayLike | None = None,  # (#M, #C)
+        joint_coords: ArrayLike | None = None,  # (#J, #C)
+        center_coords: ArrayLike | None = None,  # (#M, #C), kept for when a method needs it
+        options: Options | None = None,
+    ) -> BindJob: ...
+    @property
+    def progress(self) -> float: ...  # 0 to 1, never falls
+    @property
+    def stage(self) -> str: ...  # what is being computed, for people; empty before it begins
+    @property
+    def done(self) -> bool: ...  # whether result() answers at once
+    def cancel(self) -> None: ...  # result() raises Cancelled then; what is done stays done
+    def wait(self, seconds: float | None = None) -> bool: ...  # whether it is done
+    def result(self) -> CoupledRig: ...  # waits; raises what the bind raises
+    @staticmethod
+    def _panic_for_tests() -> BindJob: ...
+
+@final
+class MethodJob:
+    """A change of a rig's skinning method: what it needs is computed in a thread, if it is not there already.
+
+    The rig can be used meanwhile and keeps its method until result() is called. Dropping the job cancels it.
+    """
+
+    @property
+    def method(self) -> str: ...  # that the rig is to have
+    @property
+    def progress(self) -> float: ...
+    @property
+    def stage(self) -> str: ...
+    @property
+    def done(self) -> bool: ...
+    def cancel(self) -> None: ...
+    def wait(self, seconds: float | None = None) -> bool: ...
+    def result(self) -> None: ...  # waits, then changes the method
 
 def mean_value_coordinates(points: ArrayLike, cage_vertices: ArrayLike, cage_faces: Faces) -> Doubles: ...
 def check_cage(cage_vertices: ArrayLike, cage_faces: Faces) -> CageCheck: ...

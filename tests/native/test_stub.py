@@ -40,15 +40,21 @@ def test_names_and_signatures_agree():
     assert in_module == set(functions) | (set(classes) - typed)
     for name, node in functions.items():
         assert signature(getattr(core, name)) == parameters(node), name
-    rig = {node.name: node for node in classes["CoupledRig"].body if isinstance(node, ast.FunctionDef)}
-    assert public(dir(core.CoupledRig)) == public(rig)
-    assert signature(core.CoupledRig) == parameters(rig["__new__"])
-    for name in public(rig):
-        attribute = inspect.getattr_static(core.CoupledRig, name)
-        if rig[name].decorator_list:
+    for name in ("CoupledRig", "BindJob", "MethodJob"):
+        members = {node.name: node for node in classes[name].body if isinstance(node, ast.FunctionDef)}
+        check_class(getattr(core, name), members)
+
+
+def check_class(found, members):
+    assert public(dir(found)) == public(members)
+    if "__new__" in members:
+        assert signature(found) == parameters(members["__new__"])
+    for name in public(members):
+        attribute = inspect.getattr_static(found, name)
+        if members[name].decorator_list:
             assert inspect.isgetsetdescriptor(attribute), name
         else:
-            assert signature(attribute) == parameters(rig[name]), name
+            assert signature(attribute) == parameters(members[name]), name
 
 
 def test_mypy_finds_the_stub_true():

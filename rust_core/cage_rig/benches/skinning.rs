@@ -7,7 +7,7 @@
 
 use cage_rig::skinning::centers::{centers, CenterOptions};
 use cage_rig::skinning::{PackedWeights, SkinningInput, METHODS};
-use cage_rig::{Matrix3, Point, Rows, SkinWeights, Transform};
+use cage_rig::{unwatched, Matrix3, Point, Rows, SkinWeights, Transform};
 use std::time::Instant;
 
 /// A bumpy tube along x with its weights, four bones a vertex.
@@ -87,7 +87,8 @@ fn integrate() {
     let run = |values: &Rows, bins| {
         let options = CenterOptions { bins, ..CenterOptions::default() };
         let start = Instant::now();
-        let found = centers(&snake.skin, &snake.triangles, &weights, values, &options);
+        let found =
+            unwatched(|part| centers(&snake.skin, &snake.triangles, &weights, values, &options, part));
         (found, start.elapsed().as_secs_f64())
     };
     for bins in [16, 32, 64, 128] {

@@ -3,6 +3,7 @@
 //! One enum for each thing a user brings (cage, skin, weights, skeleton, pose). They are raised
 //! where input enters; an edit that returns one has changed nothing.
 
+use crate::progress::Cancelled;
 use thiserror::Error;
 
 /// Anything that can be wrong with what was handed in.
@@ -23,6 +24,9 @@ pub enum Error {
     /// An edit cannot be carried out.
     #[error(transparent)]
     Pose(#[from] PoseError),
+    /// Whoever asked for the work wants it no more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// An argument names no member of a family.
     #[error("there is no {family} named {name:?}; known: {known}")]
     UnknownName {

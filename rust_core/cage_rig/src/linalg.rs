@@ -1,6 +1,7 @@
 //! Dense linear algebra, the only file that names faer: LU, SVD, products.
 
 use crate::points::Point;
+use crate::progress::{unwatched, Cancelled, Part};
 use crate::rows::Rows;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::{PartialPivLu, Solve};
@@ -24,19 +25,26 @@ const PRODUCT_ROWS: usize = 1024;
 
 /// A · B.
 pub(crate) fn product(a: &Rows, b: &Rows) -> Rows {
+    unwatched(|part| long_product(a, b, part))
+}
+
+/// A · B, where A has many rows.
+pub(crate) fn long_product(a: &Rows, b: &Rows, part: &Part) -> Result<Rows, Cancelled> {
     let mut out = Rows::zeros(a.len(), b.columns());
     if out.is_empty() || a.columns() == 0 {
-        return out;
+        return Ok(out);
     }
     let (inner, width) = (a.columns(), b.columns());
+    let count = part.count(a.len());
     let blocks = out.as_mut_slice().par_chunks_mut(PRODUCT_ROWS * width);
-    blocks.zip(a.as_slice().par_chunks(PRODUCT_ROWS * inner)).for_each(|(out, a)| {
+    blocks.zip(a.as_slice().par_chunks(PRODUCT_ROWS * inner)).try_for_each(|(out, a)| {
         let rows = out.len() / width;
         let left = MatRef::from_row_major_slice(a, rows, inner);
         let target = MatMut::from_row_major_slice_mut(out, rows, width);
         matmul(target, Accum::Replace, left, view(b), 1.0, Par::Seq);
-    });
-    out
+        count.step(rows)
+    })?;
+    Ok(out)
 }
 
 /// The factors of a square matrix, made once and solved with often.

@@ -2,9 +2,10 @@
 
 mod common;
 
+use cage_rig::coordinates::mean_value;
 use cage_rig::skinning::METHODS;
 use cage_rig::sync::{BindInput, Carried};
-use cage_rig::{CoupledRig, Error, Point, SkinError};
+use cage_rig::{unwatched, CoupledRig, Error, Point, SkinError};
 use common::shapes::{bar, partly_caged};
 use common::{distance, lively_pose, nudged, points, Fixture};
 
@@ -181,7 +182,7 @@ fn stand_on(
 #[test]
 fn a_fine_cage_adds_to_what_a_coarse_cage_does() {
     let (lower, upper) = (bar(), partly_caged());
-    let coords = cage_rig::coordinates::mean_value::coordinates(&lower.cage(), &upper.cage);
+    let coords = unwatched(|part| mean_value::coordinates(&lower.cage(), &upper.cage, part));
     let pose = lively_pose(&lower, 0.7);
     let (mut coarse, mut fine) = (lower.rig(), upper.rig());
     let long: Vec<Point> = lower.cage.iter().map(|c| Point::new(1.3 * c.x, c.y, c.z)).collect();

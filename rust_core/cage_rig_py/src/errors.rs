@@ -1,8 +1,8 @@
-//! Exceptions: one for each thing a user brings, all of them `ValueError`s.
+//! Exceptions: one for each thing a user brings, all of them `ValueError`s; and one for work that nobody wants any more.
 
 use cage_rig::Error;
 use pyo3::create_exception;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
 create_exception!(cage_rig_core, CageRigError, PyValueError, "Something handed to the core is not usable.");
@@ -23,6 +23,8 @@ create_exception!(
     "An argument has the wrong shape, type or values."
 );
 
+create_exception!(cage_rig_core, Cancelled, PyException, "A job was cancelled; nothing of it is left.");
+
 /// The exception for a fault of the core.
 pub(crate) fn raise(error: impl Into<Error>) -> PyErr {
     let error = error.into();
@@ -33,6 +35,7 @@ pub(crate) fn raise(error: impl Into<Error>) -> PyErr {
         Error::Weights(_) => WeightsError::new_err(message),
         Error::Skeleton(_) => SkeletonError::new_err(message),
         Error::Pose(_) => PoseError::new_err(message),
+        Error::Cancelled(_) => Cancelled::new_err(message),
         Error::Size { .. } | Error::NotFinite { .. } => ArrayError::new_err(message),
         Error::UnknownName { .. } | Error::Option { .. } => CageRigError::new_err(message),
     }
@@ -58,5 +61,6 @@ pub(crate) fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("WeightsError", py.get_type::<WeightsError>())?;
     module.add("SkeletonError", py.get_type::<SkeletonError>())?;
     module.add("PoseError", py.get_type::<PoseError>())?;
-    module.add("ArrayError", py.get_type::<ArrayError>())
+    module.add("ArrayError", py.get_type::<ArrayError>())?;
+    module.add("Cancelled", py.get_type::<Cancelled>())
 }

@@ -4,7 +4,7 @@ use crate::arrays;
 use crate::errors::OrRaise;
 use cage_rig::coordinates::{mean_value, KINDS};
 use cage_rig::skinning::METHODS;
-use cage_rig::Cage;
+use cage_rig::{unwatched, Cage};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -21,7 +21,10 @@ fn mean_value_coordinates<'py>(
     let vertices = arrays::points(cage_vertices, "cage_vertices", ("#C", None))?;
     let faces = arrays::polygons(cage_faces, "cage_faces")?;
     let rows = py
-        .detach(|| Cage::new(vertices, &faces).map(|cage| mean_value::coordinates(&cage, &points)))
+        .detach(|| {
+            Cage::new(vertices, &faces)
+                .map(|cage| unwatched(|part| mean_value::coordinates(&cage, &points, part)))
+        })
         .or_raise()?;
     arrays::from_rows(py, &rows)
 }

@@ -4,6 +4,8 @@
 mod arrays;
 mod errors;
 mod functions;
+mod input;
+mod jobs;
 mod rig;
 
 use pyo3::prelude::*;
@@ -14,6 +16,8 @@ fn cage_rig_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("PanicException", module.py().get_type::<pyo3::panic::PanicException>())?;
     module.add_class::<rig::CoupledRig>()?;
+    module.add_class::<jobs::BindJob>()?;
+    module.add_class::<jobs::MethodJob>()?;
     functions::add_to(module)?;
     errors::add_to(module)
 }

@@ -3,25 +3,43 @@
 
 use crate::arrays::{self, Out};
 use crate::errors::{CageRigError, OrRaise};
-use cage_rig::sync::{BindInput, BindOptions, Carried, Known};
-use cage_rig::{Cage, Point, Skeleton};
+use crate::input::{read_input, Given, Meshes};
+use crate::jobs::MethodJob;
+use cage_rig::sync::rest_centers::RestCenters;
+use cage_rig::sync::Carried;
+use cage_rig::Point;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// A character bound to a cage and a skeleton.
 #[pyclass(frozen, module = "cage_rig_core")]
+#[derive(Clone)]
 pub(crate) struct CoupledRig {
-    rig: Mutex<cage_rig::CoupledRig>,
+    rig: Arc<Mutex<cage_rig::CoupledRig>>,
     joints: usize,
     cage_vertices: usize,
     skin_vertices: usize,
 }
 
 impl CoupledRig {
+    /// Puts a bound rig behind its lock.
+    pub(crate) fn of(rig: cage_rig::CoupledRig) -> Self {
+        let (joints, cage_vertices) = (rig.joints().len(), rig.rest_cage().len());
+        let skin_vertices = rig.cage_coords().len();
+        Self { rig: Arc::new(Mutex::new(rig)), joints, cage_vertices, skin_vertices }
+    }
+
+    /// Takes its centers of rotation; a rig that is unusable needs none.
+    pub(crate) fn take_centers(&self, centers: RestCenters) {
+        if let Ok(mut rig) = self.rig.lock() {
+            rig.take_centers(centers);
+        }
+    }
+
     /// Runs `work` on the rig without the GIL.
-    fn with<R: Send>(
+    pub(crate) fn with<R: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut cage_rig::CoupledRig) -> R + Send,
@@ -63,36 +81,11 @@ impl CoupledRig {
         center_coords: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let skin = arrays::points(skin_vertices, "skin_vertices", ("#M", None))?;
-        let cage = arrays::points(cage_vertices, "cage_vertices", ("#C", None))?;
-        let joints = arrays::points(joints, "joints", ("#J", None))?;
-        let (m, c, j) = (("#M", Some(skin.len())), ("#C", Some(cage.len())), ("#J", Some(joints.len())));
-        let matrix = |value: Option<&Bound<'_, PyAny>>, name, shape| {
-            value.map(|value| arrays::matrix(value, name, shape)).transpose()
-        };
-        let known = Known {
-            anchors: anchors.map(|anchors| arrays::integers(anchors, "anchors")).transpose()?,
-            cage_coords: matrix(cage_coords, "cage_coords", [m, c])?,
-            joint_coords: matrix(joint_coords, "joint_coords", [j, c])?,
-            center_coords: matrix(center_coords, "center_coords", [m, c])?,
-        };
-        let cage_faces = arrays::polygons(cage_faces, "cage_faces")?;
-        let parents = arrays::integers(parents, "parents")?;
-        let input = BindInput {
-            skin_weights: arrays::weights(skin_weights, skin.len(), joints.len())?,
-            skin_vertices: skin,
-            skin_faces: arrays::polygons(skin_faces, "skin_faces")?,
-            skeleton: Skeleton::new(joints, &parents).or_raise()?,
-            cage: py.detach(|| Cage::new(cage, &cage_faces)).or_raise()?,
-            method: cage_rig::skinning::method(method).or_raise()?,
-            coordinates: cage_rig::coordinates::kind(coordinates).or_raise()?,
-            known,
-            options: read_options(options)?,
-        };
-        let (skin_vertices, joints, cage_vertices) =
-            (input.skin_vertices.len(), input.skeleton.len(), input.cage.vertices().len());
-        let rig = py.detach(|| cage_rig::CoupledRig::new(input)).or_raise()?;
-        Ok(Self { rig: Mutex::new(rig), joints, cage_vertices, skin_vertices })
+        let meshes =
+            Meshes { skin_vertices, skin_faces, skin_weights, joints, parents, cage_vertices, cage_faces };
+        let given = Given { anchors, cage_coords, joint_coords, center_coords };
+        let input = read_input(py, &meshes, &given, (method, coordinates), options)?;
+        py.detach(|| cage_rig::CoupledRig::new(input)).map(Self::of).or_raise()
     }
 
     /// The bones move: transforms (#J, 4, 4) measured at rest_joints (default: those of the bind).
@@ -174,6 +167,11 @@ impl CoupledRig {
     fn set_method(&self, py: Python<'_>, name: &str) -> PyResult<()> {
         let method = cage_rig::skinning::method(name).or_raise()?;
         self.with(py, |rig| rig.set_method(method))
+    }
+
+    /// Begins to change the method; the rig keeps the one that it has until the job's result() is called.
+    fn start_method(&self, py: Python<'_>, name: &str) -> PyResult<MethodJob> {
+        MethodJob::start(py, self, cage_rig::skinning::method(name).or_raise()?)
     }
 
     /// The name of the skinning method.
@@ -349,25 +347,4 @@ impl CoupledRig {
         let Self { skin_vertices, joints, cage_vertices, .. } = self;
         format!("<CoupledRig: {skin_vertices} skin vertices, {joints} joints, {cage_vertices} cage vertices>")
     }
-}
-
-fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOptions> {
-    let mut options = BindOptions::default();
-    for (key, value) in given.into_iter().flatten() {
-        match key.extract::<String>()?.as_str() {
-            "max_anchor_ratio" => options.maxvol.max_ratio = value.extract()?,
-            "max_anchor_swaps" => options.maxvol.max_swaps = value.extract()?,
-            "locality_exponent" => options.locality_exponent = value.extract()?,
-            "min_singular" => options.min_singular = value.extract()?,
-            "falloff" => options.falloff = value.extract()?,
-            "center_sigma" => options.centers.sigma = value.extract()?,
-            "center_bins" => options.centers.bins = value.extract()?,
-            unknown => {
-                return Err(CageRigError::new_err(format!(
-                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular, falloff, center_sigma, center_bins"
-                )))
-            }
-        }
-    }
-    Ok(options)
 }

@@ -12,26 +12,31 @@
 use super::degenerate::Seen;
 use crate::cage::Cage;
 use crate::points::{bounding_diagonal, Matrix3, Point};
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Points nearer than this part of the size lie *on* a vertex, an edge or a face.
 const TOUCH: f64 = 1e-12;
+/// Points that one thread takes at a time.
+const CHUNK: usize = 64;
 
 /// Φ, `#points by #C`, of `points` (`#points by 3`): rows sum to 1 and reproduce their point.
-pub fn coordinates(cage: &Cage, points: &[Point]) -> Rows {
+pub fn coordinates(cage: &Cage, points: &[Point], part: &Part) -> Result<Rows, Cancelled> {
     let surface = Surface::new(cage.vertices(), cage.triangles());
     let correction = Correction::new(cage.vertices());
-    let mut rows = Rows::zeros(points.len(), cage.vertices().len());
-    rows.as_mut_slice().par_chunks_mut(cage.vertices().len()).zip(points).with_min_len(64).for_each_init(
-        Scratch::default,
-        |scratch, (row, point)| {
+    let width = cage.vertices().len();
+    let mut rows = Rows::zeros(points.len(), width);
+    let count = part.count(points.len());
+    let chunks = rows.as_mut_slice().par_chunks_mut(CHUNK * width).zip(points.par_chunks(CHUNK));
+    chunks.try_for_each_init(Scratch::default, |scratch, (rows, points)| {
+        for (row, point) in rows.chunks_exact_mut(width).zip(points) {
             surface.weights(point, scratch, row);
             correction.apply(cage.vertices(), point, row);
-        },
-    );
-    rows
+        }
+        count.step(points.len())
+    })?;
+    Ok(rows)
 }
 
 /// A triangle mesh, open or closed, prepared for weights of many points.
@@ -73,7 +78,8 @@ impl<'a> Surface<'a> {
     /// Prepares `vertices` (`#V by 3`) and `triangles`; triangles without area count for nothing.
     pub fn new(vertices: &'a [Point], triangles: &[[u32; 3]]) -> Self {
         let size = bounding_diagonal(vertices);
-        let mut known = HashMap::with_capacity(triangles.len() * 3 / 2);
+        // Edges by their lower vertex, of which each has a few.
+        let mut known: Vec<Vec<(u32, usize)>> = vec![Vec::new(); vertices.len()];
         let mut edges = Vec::with_capacity(triangles.len() * 3 / 2);
         let mut faces = Vec::with_capacity(triangles.len());
         for triangle in triangles {
@@ -86,11 +92,14 @@ impl<'a> Surface<'a> {
             let mut face = Face { corners, edges: [0; 3], signs: [1.0; 3], double_area };
             for k in 0..3 {
                 let (from, to) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-                let key = [from.min(to), from.max(to)];
-                face.edges[k] = *known.entry(key).or_insert_with(|| {
-                    edges.push(key);
-                    edges.len() - 1
-                });
+                let (low, high) = (from.min(to), from.max(to));
+                let around = &mut known[low as usize];
+                let found = around.iter().find(|(end, _)| *end == high);
+                face.edges[k] = found.map_or(edges.len(), |(_, edge)| *edge);
+                if face.edges[k] == edges.len() {
+                    around.push((high, edges.len()));
+                    edges.push([low, high]);
+                }
                 face.signs[k] = if from < to { 1.0 } else { -1.0 };
             }
             faces.push(face);

@@ -13,6 +13,7 @@ mod tests;
 use crate::cage::Cage;
 use crate::error::Error;
 use crate::points::Point;
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 
 /// A kind of cage coordinates.
@@ -23,7 +24,7 @@ pub struct CoordinateKind {
     /// The name people read.
     pub label: &'static str,
     /// Φ, `#points by #C`, of points (`#points by 3`, rig space) with respect to a cage.
-    pub compute: fn(&Cage, &[Point]) -> Rows,
+    pub compute: fn(&Cage, &[Point], &Part) -> Result<Rows, Cancelled>,
 }
 
 /// Every kind there is. The first one is the default.

@@ -1,11 +1,16 @@
 //! What every kind of coordinates must do, by being in the table.
 
 use super::naive::ORACLES;
-use super::{kind, KINDS};
+use super::{kind, CoordinateKind, KINDS};
 use crate::cage::Cage;
 use crate::fixtures::{self, arm, random::Random};
 use crate::points::{bounding_diagonal, Point};
+use crate::progress::unwatched;
 use crate::rows::Rows;
+
+fn compute(kind: &CoordinateKind, cage: &Cage, points: &[Point]) -> Rows {
+    unwatched(|part| (kind.compute)(cage, points, part))
+}
 
 /// Sums and linear precision of `rows` at `points`, relative to the size of the cage.
 fn assert_precise(rows: &Rows, cage: &Cage, points: &[Point], tolerance: f64, what: &str) {
@@ -29,9 +34,9 @@ fn rows_sum_to_one_and_reproduce_their_point_inside_and_outside() {
     for kind in KINDS {
         for fixture in fixtures::all() {
             let cage = fixture.cage();
-            assert_precise(&(kind.compute)(&cage, &fixture.skin), &cage, &fixture.skin, 1e-13, fixture.name);
+            assert_precise(&compute(kind, &cage, &fixture.skin), &cage, &fixture.skin, 1e-13, fixture.name);
             let points = points_around(&cage, 300, 1);
-            assert_precise(&(kind.compute)(&cage, &points), &cage, &points, 1e-13, fixture.name);
+            assert_precise(&compute(kind, &cage, &points), &cage, &points, 1e-13, fixture.name);
         }
     }
 }
@@ -42,7 +47,7 @@ fn every_kind_agrees_with_its_oracle() {
         let oracle = ORACLES.iter().find(|(name, _)| *name == kind.name).expect("every kind has an oracle").1;
         for fixture in fixtures::all() {
             let cage = fixture.cage();
-            let rows = (kind.compute)(&cage, &fixture.skin);
+            let rows = compute(kind, &cage, &fixture.skin);
             for (i, point) in fixture.skin.iter().enumerate().step_by(7) {
                 let expected = oracle(&cage, point);
                 let worst = rows.row(i).iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -73,7 +78,7 @@ fn on_and_near_vertices_edges_and_faces_rows_stay_precise() {
                 let places =
                     [a, a + (b - a) * along, (a + b + c) / 3.0, a + (b - a) * 1e-7 + (c - a) * along];
                 let points: Vec<Point> = places.iter().flat_map(|p| sweep(*p, &directions, size)).collect();
-                assert_precise(&(kind.compute)(&cage, &points), &cage, &points, 1e-12, fixture.name);
+                assert_precise(&compute(kind, &cage, &points), &cage, &points, 1e-12, fixture.name);
             }
         }
     }
@@ -94,7 +99,7 @@ fn in_the_plane_of_a_face_or_on_the_line_of_an_edge_rows_are_continuous() {
                 let offset = normal + random.point() * 0.3;
                 let steps: [f64; 7] = [0.0, 1e-14, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8];
                 let points = steps.map(|step| place + offset * step * size);
-                let rows = (kind.compute)(&cage, &points);
+                let rows = compute(kind, &cage, &points);
                 for (i, step) in steps.iter().enumerate() {
                     let change =
                         rows.row(i).iter().zip(rows.row(0)).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
@@ -109,7 +114,7 @@ fn in_the_plane_of_a_face_or_on_the_line_of_an_edge_rows_are_continuous() {
 fn at_a_cage_vertex_only_that_vertex_counts() {
     for kind in KINDS {
         let cage = fixtures::shapes::blob().cage();
-        let rows = (kind.compute)(&cage, cage.vertices());
+        let rows = compute(kind, &cage, cage.vertices());
         for k in 0..rows.len() {
             assert!(rows
                 .row(k)
@@ -133,7 +138,7 @@ fn mean_value_equals_the_reference_on_the_arm() {
     }
     let fixture = arm::fixture();
     let cage = fixture.cage();
-    let rows = super::mean_value::coordinates(&cage, &fixture.skin);
+    let rows = compute(&KINDS[0], &cage, &fixture.skin);
     let reference = arm::open("bind").rows("Phi");
     let worst =
         rows.as_slice().iter().zip(reference.as_slice()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -6,6 +6,7 @@ use super::PackedWeights;
 use crate::fixtures::{self, arm, Fixture};
 use crate::mesh::{triangulate, Polygons};
 use crate::points::{to_f32, Point};
+use crate::progress::unwatched;
 use crate::rows::Rows;
 use crate::weights::SkinWeights;
 
@@ -22,7 +23,8 @@ fn positions(fixture: &Fixture) -> Rows {
 fn found(fixture: &Fixture, values: &Rows, bins: u32) -> Rows {
     let weights = PackedWeights::new(&SkinWeights::from_dense(&fixture.weights).expect("valid weights"));
     let options = CenterOptions { bins, ..CenterOptions::default() };
-    centers(&to_f32(&fixture.skin), &triangles(fixture), &weights, values, &options)
+    let (skin, triangles) = (to_f32(&fixture.skin), triangles(fixture));
+    unwatched(|part| centers(&skin, &triangles, &weights, values, &options, part))
 }
 
 /// Mean and largest error over the spread of what moves alike, of every seventh vertex.

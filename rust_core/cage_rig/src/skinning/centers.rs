@@ -20,9 +20,10 @@
 //! alike. The snake has 119,802 vertices, 98 bones and 44 cage vertices; two busy cores.
 
 use super::PackedWeights;
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 /// How centers are integrated.
@@ -55,21 +56,25 @@ pub fn centers(
     weights: &PackedWeights,
     values: &Rows,
     options: &CenterOptions,
-) -> Rows {
-    let sources = Sources::new(positions, triangles, weights, values, options);
+    part: &Part,
+) -> Result<Rows, Cancelled> {
+    let [gathering, integrating] = part.split([1.0, 7.0]);
+    let sources = Sources::new(positions, triangles, weights, values, options, &gathering)?;
     let width = values.columns();
+    let vertices = integrating.count(values.len());
     let mut out = values.clone();
     let most = options.most_influences();
-    out.as_mut_slice().par_chunks_mut(CHUNK * width.max(1)).enumerate().for_each_init(
+    out.as_mut_slice().par_chunks_mut(CHUNK * width.max(1)).enumerate().try_for_each_init(
         Vec::new,
         |scratch, (chunk, rows)| {
             for (i, row) in rows.chunks_exact_mut(width).enumerate() {
                 let influences = largest(weights.row(CHUNK * chunk + i).iter().copied(), most);
                 sources.integrate(&influences, options.sigma, scratch, row);
             }
+            vertices.step(rows.len() / width)
         },
-    );
-    out
+    )?;
+    Ok(out)
 }
 
 impl CenterOptions {
@@ -82,7 +87,11 @@ impl CenterOptions {
     }
 }
 
+/// Triangles that one thread looks at at a time.
+const SEEN_AT_ONCE: usize = 4096;
+
 /// A triangle seen by one pair of its bones.
+#[derive(Clone, Copy)]
 struct Entry {
     pair: (u32, u32),
     bin: (u32, u32),
@@ -129,39 +138,38 @@ impl Sources {
         weights: &PackedWeights,
         values: &Rows,
         options: &CenterOptions,
-    ) -> Self {
+        part: &Part,
+    ) -> Result<Self, Cancelled> {
+        let [seeing, binning, summing] = part.split([1.0, 2.0, 6.0]);
         let areas: Vec<f64> = triangles.iter().map(|corners| area(positions, corners)).collect();
-        let mut entries: Vec<Entry> = (0..triangles.len())
+        let seen = see(triangles, &areas, weights, options, &seeing)?;
+        let entries = binning.count(seen.values().map(Vec::len).sum());
+        let binned = seen
             .into_par_iter()
-            .filter(|&t| areas[t] > 0.0)
-            .flat_map_iter(|t| {
-                let corners = triangles[t].iter().flat_map(|&v| weights.row(v as usize));
-                let mean = largest(corners.map(|&(j, w)| (j, w / 3.0)), options.most_influences());
-                pairs(&mean).map(|(pair, weights)| entry(pair, weights, t, options.bins)).collect::<Vec<_>>()
+            .map(|(pair, mut group)| {
+                group.par_sort_unstable_by_key(|entry| (entry.bin, entry.triangle));
+                entries.step(group.len())?;
+                Ok((pair, sources_of(&group, &areas, options.bins)))
             })
-            .collect();
-        entries.par_sort_unstable_by_key(|entry| (entry.pair, entry.bin, entry.triangle));
-        let (list, targets): (Vec<Source>, Vec<Vec<Member>>) = if options.bins == 0 {
-            let alone = |t: usize| vec![(t, [areas[t], 0.0, 0.0])];
-            (entries.iter().map(source_of_triangle).collect(), (0..areas.len()).map(alone).collect())
-        } else {
-            let groups = entries.chunk_by(|a, b| (a.pair, a.bin) == (b.pair, b.bin));
-            groups.enumerate().map(|(target, group)| source_of_bin(group, &areas, target)).unzip()
-        };
-        let width = values.columns().max(1);
-        let mut sums = Rows::zeros(targets.len(), 3 * values.columns());
-        sums.as_mut_slice().par_chunks_mut(3 * width).zip(&targets).for_each(|(parts, members)| {
-            for (triangle, masses) in members {
-                for &corner in &triangles[*triangle] {
-                    for (part, mass) in parts.chunks_exact_mut(width).zip(masses) {
-                        add(part, mass / 3.0, values.row(corner as usize));
-                    }
+            .collect::<Result<Vec<_>, Cancelled>>()?;
+        let (mut pairs, mut list, mut targets) = (HashMap::new(), Vec::new(), Vec::new());
+        for (pair, found) in binned {
+            pairs.insert(pair, list.len()..list.len() + found.len());
+            for (mut source, members) in found {
+                if options.bins > 0 {
+                    source.target = targets.len() as u32;
+                    targets.push(members);
                 }
+                list.push(source);
             }
-        });
+        }
+        if options.bins == 0 {
+            targets = areas.iter().enumerate().map(|(t, area)| vec![(t, [*area, 0.0, 0.0])]).collect();
+        }
+        let values = sums(&targets, triangles, values, &summing)?;
         let masses =
             targets.iter().map(|members| members.iter().map(|(_, masses)| masses[0]).sum()).collect();
-        Self { pairs: ranges(&entries, options.bins), list, masses, values: sums }
+        Ok(Self { pairs, list, masses, values })
     }
 
     /// Writes the value at the center of a vertex; leaves it where there is nothing to integrate.
@@ -206,9 +214,38 @@ fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
     sum.iter_mut().zip(values).for_each(|(sum, x)| *sum += factor * x);
 }
 
-fn source_of_triangle(entry: &Entry) -> Source {
-    let factor = entry.weights[0] * entry.weights[1];
-    Source { weights: entry.weights, spread: [0.0; 3], factor, target: entry.triangle }
+/// Every triangle as the pairs of its bones see it, by pair.
+fn see(
+    triangles: &[[u32; 3]],
+    areas: &[f64],
+    weights: &PackedWeights,
+    options: &CenterOptions,
+    part: &Part,
+) -> Result<BTreeMap<(u32, u32), Vec<Entry>>, Cancelled> {
+    let count = part.count(triangles.len());
+    let chunks = triangles.par_chunks(SEEN_AT_ONCE).enumerate().map(|(chunk, corners)| {
+        let mut entries = Vec::new();
+        for (k, corners) in corners.iter().enumerate() {
+            let triangle = SEEN_AT_ONCE * chunk + k;
+            if areas[triangle] > 0.0 {
+                let influences = corners.iter().flat_map(|&v| weights.row(v as usize));
+                let mean = largest(influences.map(|&(j, w)| (j, w / 3.0)), options.most_influences());
+                entries
+                    .extend(pairs(&mean).map(|(pair, weights)| entry(pair, weights, triangle, options.bins)));
+            }
+        }
+        entries.sort_unstable_by_key(|entry| (entry.pair, entry.bin, entry.triangle));
+        count.step(corners.len())?;
+        Ok(entries)
+    });
+    let mut seen: BTreeMap<_, Vec<Entry>> = BTreeMap::new();
+    for entries in chunks.collect::<Result<Vec<_>, Cancelled>>()? {
+        part.check()?;
+        for group in entries.chunk_by(|a, b| a.pair == b.pair) {
+            seen.entry(group[0].pair).or_default().extend_from_slice(group);
+        }
+    }
+    Ok(seen)
 }
 
 fn entry(pair: (u32, u32), weights: [f64; 2], triangle: usize, bins: u32) -> Entry {
@@ -216,8 +253,22 @@ fn entry(pair: (u32, u32), weights: [f64; 2], triangle: usize, bins: u32) -> Ent
     Entry { pair, bin: (a, b), triangle: triangle as u32, weights }
 }
 
+/// The sources of a pair: its bins, each with what it gathers, or its triangles, whose targets are known.
+fn sources_of(group: &[Entry], areas: &[f64], bins: u32) -> Vec<(Source, Vec<Member>)> {
+    if bins == 0 {
+        return group.iter().map(source_of_triangle).collect();
+    }
+    group.chunk_by(|a, b| a.bin == b.bin).map(|bin| source_of_bin(bin, areas)).collect()
+}
+
+fn source_of_triangle(entry: &Entry) -> (Source, Vec<Member>) {
+    let factor = entry.weights[0] * entry.weights[1];
+    let source = Source { weights: entry.weights, spread: [0.0; 3], factor, target: entry.triangle };
+    (source, Vec::new())
+}
+
 /// One source for a whole bin, and what it gathers: triangles with their mass area b_j b_k.
-fn source_of_bin(group: &[Entry], areas: &[f64], target: usize) -> (Source, Vec<Member>) {
+fn source_of_bin(group: &[Entry], areas: &[f64]) -> (Source, Vec<Member>) {
     let mass = |e: &Entry| areas[e.triangle as usize] * e.weights[0] * e.weights[1];
     let total: f64 = group.iter().map(mass).sum();
     let mean = |of: &dyn Fn(&Entry) -> f64| group.iter().map(|e| mass(e) * of(e)).sum::<f64>() / total;
@@ -228,20 +279,31 @@ fn source_of_bin(group: &[Entry], areas: &[f64], target: usize) -> (Source, Vec<
         let (mass, [j, k]) = (mass(e), off(e));
         (e.triangle as usize, [mass, mass * j, mass * k])
     };
-    let source = Source { weights, spread, factor: 1.0, target: target as u32 };
+    let source = Source { weights, spread, factor: 1.0, target: 0 };
     (source, group.iter().map(member).collect())
 }
 
-/// Where the sources of each pair are in the list.
-fn ranges(entries: &[Entry], bins: u32) -> HashMap<(u32, u32), Range<usize>> {
-    let mut start = 0;
-    let mut found = HashMap::new();
-    for group in entries.chunk_by(|a, b| a.pair == b.pair) {
-        let sources = if bins == 0 { group.len() } else { group.chunk_by(|a, b| a.bin == b.bin).count() };
-        found.insert(group[0].pair, start..start + sources);
-        start += sources;
-    }
-    found
+/// What each target gathers of `values`, as of [`Sources::values`].
+fn sums(
+    targets: &[Vec<Member>],
+    triangles: &[[u32; 3]],
+    values: &Rows,
+    part: &Part,
+) -> Result<Rows, Cancelled> {
+    let width = values.columns().max(1);
+    let mut sums = Rows::zeros(targets.len(), 3 * values.columns());
+    let count = part.count(targets.iter().map(Vec::len).sum());
+    sums.as_mut_slice().par_chunks_mut(3 * width).zip(targets).try_for_each(|(parts, members)| {
+        for (triangle, masses) in members {
+            for &corner in &triangles[*triangle] {
+                for (part, mass) in parts.chunks_exact_mut(width).zip(masses) {
+                    add(part, mass / 3.0, values.row(corner as usize));
+                }
+            }
+        }
+        count.step(members.len())
+    })?;
+    Ok(sums)
 }
 
 fn area(positions: &[[f32; 3]], corners: &[u32; 3]) -> f64 {

@@ -10,11 +10,13 @@ use super::reach::reach;
 use super::rest_centers::RestCenters;
 use super::rest_skin::RestSkin;
 use super::skeleton_updater::SkeletonUpdater;
+use super::stages::Stages;
 use crate::cage::Cage;
 use crate::coordinates::CoordinateKind;
 use crate::error::{Error, SkinError, WeightsError};
 use crate::mesh::{triangulate, FaceFault, Polygons};
 use crate::points::{bounding_diagonal, first_not_finite, Point};
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use crate::skeleton::Skeleton;
 use crate::skinning::centers::{centers, CenterOptions};
@@ -137,24 +139,27 @@ pub struct Binding {
 
 impl Binding {
     /// Computes what is not known.
-    pub fn new(input: BindInput) -> Result<Self, Error> {
+    pub fn new(input: BindInput, stages: &Stages) -> Result<Self, Error> {
         check_options(&input.options)?;
         let triangles = check_skin(&input)?;
         let BindInput { skin_vertices: skin, skin_weights: weights, skeleton, cage, known, options, .. } =
             input;
         let (rows, columns, joints) = (skin.len(), cage.vertices().len(), skeleton.len());
 
+        stages.coordinates.begin("cage coordinates")?;
         let cage_coords = match checked(known.cage_coords, "cage_coords", rows, columns)? {
             Some(coords) => coords,
-            None => (input.coordinates.compute)(&cage, &skin),
+            None => (input.coordinates.compute)(&cage, &skin, &stages.coordinates)?,
         };
-        let reach = reach(&cage, &skin, options.falloff);
+        let center_coords = checked(known.center_coords, "center_coords", rows, columns)?;
+        let reach = reach(&cage, &skin, options.falloff, &stages.reach)?;
         if reach.iter().all(|part| *part == 0.0) {
             return Err(SkinError::OutOfReach.into());
         }
+        stages.anchors.begin("anchors of the posed cage")?;
         let chosen = match known.anchors {
-            Some(anchors) => given_anchors(&anchors, &cage_coords)?,
-            None => choose_anchors(&cage_coords, &reach, &options.maxvol),
+            Some(anchors) => given_anchors(&anchors, &cage_coords, &stages.anchors)?,
+            None => choose_anchors(&cage_coords, &reach, &options.maxvol, &stages.anchors)?,
         };
         let mut report = Report {
             cage_turned: cage.turned(),
@@ -173,24 +178,30 @@ impl Binding {
             cage_coords: &cage_coords,
             reach: &reach,
         };
+        stages.joints.begin("joint coordinates")?;
         let joint_coords = match checked(known.joint_coords, "joint_coords", joints, columns)? {
             Some(coords) => coords,
             None => {
-                let found = joint_coordinates(&cage, &at_rest, skeleton.joints(), options.locality_exponent);
+                let exponent = options.locality_exponent;
+                let found = joint_coordinates(&cage, &at_rest, skeleton.joints(), exponent, &stages.joints)?;
                 report.joints_outside_hull = found.outside_hull;
                 report.unweighted_joints = found.without_locality;
                 found.coords
             }
         };
         report.joint_error_max = largest_miss(&joint_coords, cage.vertices(), skeleton.joints());
-        let cage_updater = CageUpdater::new(&chosen.rows, &at_rest, cage.vertices(), options.min_singular);
+        stages.posed_cage.begin("posed cage")?;
+        let limit = options.min_singular;
+        let cage_updater =
+            CageUpdater::new(&chosen.rows, &at_rest, cage.vertices(), limit, &stages.posed_cage)?;
         report.anchor_condition = cage_updater.condition();
         report.regularised = cage_updater.attenuated();
+        stages.frame.begin("what every frame needs")?;
         Ok(Self {
-            center_coords: checked(known.center_coords, "center_coords", rows, columns)?,
+            center_coords,
             reach: (report.vertices_outside > 0).then(|| reach.iter().map(|part| *part as f32).collect()),
             anchors: chosen.rows,
-            rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords),
+            rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords, &stages.frame)?,
             packed_weights: PackedWeights::new(&weights),
             skin_triangles: triangles,
             center_options: options.centers,
@@ -204,12 +215,15 @@ impl Binding {
     }
 
     /// Centers of rotation under Λ = Φ_CoR Φ, `#M by #C`.
-    pub(super) fn integrate_centers(&self) -> RestCenters {
+    pub(super) fn integrate_centers(&self, part: &Part) -> Result<RestCenters, Cancelled> {
+        part.begin("centers of rotation")?;
+        let [integrating, packing] = part.split([30.0, 1.0]);
         let (skin, weights) = (self.rest_skin.at_bind(), &self.packed_weights);
-        let integrate =
-            |values: &Rows| centers(skin, &self.skin_triangles, weights, values, &self.center_options);
+        let integrate = |values: &Rows| {
+            centers(skin, &self.skin_triangles, weights, values, &self.center_options, &integrating)
+        };
         let Some(reach) = &self.reach else {
-            return self.given_centers(integrate(&self.cage_coords));
+            return self.given_centers(integrate(&self.cage_coords)?, &packing);
         };
         // What the cage does not reach stays: Φ_CoR (reach Φ), and p₀ = Φ_CoR M₀ beside it.
         let columns = self.cage_coords.columns();
@@ -219,18 +233,19 @@ impl Binding {
             coords.iter_mut().zip(self.cage_coords.row(i)).for_each(|(x, phi)| *x = phi * f64::from(*part));
             place.iter_mut().zip(skin[i]).for_each(|(x, v)| *x = v.into());
         }
-        let found = integrate(&values);
+        let found = integrate(&values)?;
         let at_bind: Vec<Point> =
             (0..skin.len()).map(|i| Point::from_row_slice(&found.row(i)[columns..])).collect();
         let mut coords = Rows::zeros(skin.len(), columns);
         (0..skin.len()).for_each(|i| coords.row_mut(i).copy_from_slice(&found.row(i)[..columns]));
-        RestCenters::new(coords, &at_bind, self.cage.vertices())
+        RestCenters::new(coords, &at_bind, self.cage.vertices(), &packing)
     }
 
     /// Centers of rotation p₀ = Λ C₀ under a given Λ (`coords`, `#M by #C`).
-    pub(super) fn given_centers(&self, coords: Rows) -> RestCenters {
+    pub(super) fn given_centers(&self, coords: Rows, part: &Part) -> Result<RestCenters, Cancelled> {
         let cage = self.cage.vertices();
-        RestCenters::new(coords.clone(), &coords.times(cage), cage)
+        let at_bind = coords.times(cage);
+        RestCenters::new(coords, &at_bind, cage, part)
     }
 }
 
@@ -298,22 +313,27 @@ fn checked(
 
 /// Anchors among the skin that the cage moves wholly, or mostly where that is too little: far outside,
 /// coordinates are large and would be chosen first.
-fn choose_anchors(cage_coords: &Rows, reach: &[f64], options: &MaxVolOptions) -> MaxVol {
+fn choose_anchors(
+    cage_coords: &Rows,
+    reach: &[f64],
+    options: &MaxVolOptions,
+    part: &Part,
+) -> Result<MaxVol, Cancelled> {
     for least in [1.0, 0.5, f64::MIN_POSITIVE] {
         let within: Vec<usize> = (0..reach.len()).filter(|&i| reach[i] >= least).collect();
         if within.len() == reach.len() {
             break;
         }
         if within.len() >= cage_coords.columns() {
-            let mut chosen = maxvol(&cage_coords.select(&within), options);
+            let mut chosen = maxvol(&cage_coords.select(&within), options, part)?;
             chosen.rows.iter_mut().for_each(|row| *row = within[*row]);
-            return chosen;
+            return Ok(chosen);
         }
     }
-    maxvol(cage_coords, options)
+    maxvol(cage_coords, options, part)
 }
 
-fn given_anchors(anchors: &[i64], cage_coords: &Rows) -> Result<MaxVol, Error> {
+fn given_anchors(anchors: &[i64], cage_coords: &Rows, part: &Part) -> Result<MaxVol, Error> {
     let vertices = cage_coords.len();
     let wanted = vertices.min(cage_coords.columns());
     if anchors.len() != wanted {
@@ -334,7 +354,7 @@ fn given_anchors(anchors: &[i64], cage_coords: &Rows) -> Result<MaxVol, Error> {
         }
         rows.push(row);
     }
-    let ratio = if wanted == vertices { 1.0 } else { ratio_of(cage_coords, &rows) };
+    let ratio = if wanted == vertices { 1.0 } else { ratio_of(cage_coords, &rows, part)? };
     Ok(MaxVol { rows, ratio, swaps: 0 })
 }
 

@@ -12,9 +12,13 @@
 use super::joint_coordinates::SkinAtRest;
 use crate::linalg::{product, svd, Lu};
 use crate::points::{Matrix3, Point, Transform};
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use crate::skinning::lbs::{blended_linear, pose_points};
 use crate::weights::SkinWeights;
+
+/// Skin vertices between two looks at the progress.
+const ROWS: usize = 1024;
 
 /// Anchors and cage of the bind, and the factors of Φ̃.
 #[derive(Debug, Clone)]
@@ -48,17 +52,23 @@ pub(super) enum Side<'a> {
 
 impl CageUpdater {
     /// Factors Φ̃. `anchors` are vertices of `skin`, `cage` is C₀; `min_singular` is τ relative to the largest singular value.
-    pub fn new(anchors: &[usize], skin: &SkinAtRest, cage: &[Point], min_singular: f64) -> Self {
+    pub fn new(
+        anchors: &[usize],
+        skin: &SkinAtRest,
+        cage: &[Point],
+        min_singular: f64,
+        part: &Part,
+    ) -> Result<Self, Cancelled> {
         let anchor_coords = skin.cage_coords.select(anchors);
-        let (fit, condition) = fit(&anchor_coords, min_singular, || cage_skin_weights(skin));
-        Self {
+        let (fit, condition) = fit(&anchor_coords, min_singular, || cage_skin_weights(skin, part))?;
+        Ok(Self {
             anchor_coords,
             anchor_rest: anchors.iter().map(|&i| skin.vertices[i]).collect(),
             anchor_weights: skin.weights.select(anchors),
             cage: cage.to_vec(),
             fit,
             condition,
-        }
+        })
     }
 
     /// Largest over smallest singular value of Φ̃.
@@ -121,9 +131,13 @@ fn add(a: &[Point], b: &[Point]) -> Vec<Point> {
     a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
-fn fit(anchor_coords: &Rows, min_singular: f64, cage_weights: impl Fn() -> SkinWeights) -> (Fit, f64) {
+fn fit(
+    anchor_coords: &Rows,
+    min_singular: f64,
+    cage_weights: impl Fn() -> Result<SkinWeights, Cancelled>,
+) -> Result<(Fit, f64), Cancelled> {
     let count = anchor_coords.columns();
-    let exact = |condition| (Fit::Exact(Lu::new(anchor_coords)), condition);
+    let exact = |condition| Ok((Fit::Exact(Lu::new(anchor_coords)), condition));
     let Some(svd) = svd(anchor_coords) else { return exact(f64::INFINITY) };
     let largest = svd.singular_values.first().copied().unwrap_or(0.0);
     let smallest = svd.singular_values.last().copied().unwrap_or(0.0);
@@ -146,7 +160,8 @@ fn fit(anchor_coords: &Rows, min_singular: f64, cage_weights: impl Fn() -> SkinW
         from_cage.row_mut(k).iter_mut().for_each(|x| *x = -*x);
         from_cage.row_mut(k)[k] += 1.0;
     }
-    (Fit::Regularised { from_anchors, from_cage, cage_weights: cage_weights(), attenuated }, condition)
+    let cage_weights = cage_weights()?;
+    Ok((Fit::Regularised { from_anchors, from_cage, cage_weights, attenuated }, condition))
 }
 
 fn transposed(matrix: &Rows) -> Rows {
@@ -159,11 +174,15 @@ fn transposed(matrix: &Rows) -> Rows {
 
 /// The skin weights carried over to the cage: w_k = Σ_i φ_ik² ω_i / Σ_i φ_ik² over the skin that it
 /// reaches. A cage vertex that touches no skin vertex at all gets no weights and stands still.
-pub fn cage_skin_weights(skin: &SkinAtRest) -> SkinWeights {
+pub fn cage_skin_weights(skin: &SkinAtRest, part: &Part) -> Result<SkinWeights, Cancelled> {
     let SkinAtRest { cage_coords, weights, reach, .. } = skin;
     let mut sums = Rows::zeros(cage_coords.columns(), weights.joints());
     let mut totals = vec![0.0; cage_coords.columns()];
+    let count = part.count(cage_coords.len());
     for i in 0..cage_coords.len() {
+        if i % ROWS == 0 {
+            count.step(ROWS)?;
+        }
         for (k, phi) in cage_coords.row(i).iter().enumerate() {
             let share = phi * phi * reach[i];
             totals[k] += share;
@@ -175,5 +194,5 @@ pub fn cage_skin_weights(skin: &SkinAtRest) -> SkinWeights {
     for (k, total) in totals.iter().enumerate().filter(|(_, total)| **total > 0.0) {
         sums.row_mut(k).iter_mut().for_each(|w| *w /= total);
     }
-    SkinWeights::from_blended(&sums)
+    Ok(SkinWeights::from_blended(&sums))
 }

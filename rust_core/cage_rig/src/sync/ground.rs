@@ -4,6 +4,7 @@
 use super::bind::Binding;
 use super::reach::Surroundings;
 use crate::points::{to_f32, Point};
+use crate::progress::{unwatched, Cancelled, Part};
 
 /// A lower cage's movement of what this rig was bound to.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,12 +27,15 @@ pub(super) struct Ground {
 
 impl Ground {
     /// As bound: the cage acts where it reaches.
-    pub fn new(binding: &Binding) -> Self {
+    pub fn new(binding: &Binding, part: &Part) -> Result<Self, Cancelled> {
         let joints = binding.skeleton_updater.skeleton().len();
         let mut ground =
             Self { mask: None, shares: vec![1.0; joints], surroundings: None, offsets: None, carried: None };
-        ground.set_mask(binding, None);
-        ground
+        if binding.reach.is_some() {
+            ground.surroundings = Some(surroundings(binding, part)?);
+            ground.set_mask(binding, None);
+        }
+        Ok(ground)
     }
 
     /// Confines the cage to `mask` (`#M`, 0 to 1; none: wherever it reaches). True if that is a change.
@@ -49,10 +53,7 @@ impl Ground {
             None => vec![1.0; self.shares.len()],
             Some(mask) => self
                 .surroundings
-                .get_or_insert_with(|| {
-                    let joints = binding.skeleton_updater.skeleton().joints();
-                    Surroundings::new(binding.rest_skin.at_bind(), joints)
-                })
+                .get_or_insert_with(|| unwatched(|part| surroundings(binding, part)))
                 .joints(mask),
         };
         self.mask = mask;
@@ -99,6 +100,11 @@ impl Ground {
         let joints = binding.skeleton_updater.joints(cage, &self.shares);
         self.carried.as_ref().map_or_else(|| joints.clone(), |carried| sum(&joints, &carried.joints))
     }
+}
+
+fn surroundings(binding: &Binding, part: &Part) -> Result<Surroundings, Cancelled> {
+    let joints = binding.skeleton_updater.skeleton().joints();
+    Surroundings::new(binding.rest_skin.at_bind(), joints, part)
 }
 
 fn sum(a: &[Point], b: &[Point]) -> Vec<Point> {

@@ -11,6 +11,7 @@ use super::max_entropy::max_entropy_coordinates;
 use crate::cage::Cage;
 use crate::coordinates::mean_value::{coordinates, Scratch, Surface};
 use crate::points::Point;
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use crate::weights::SkinWeights;
 use rayon::prelude::*;
@@ -46,17 +47,20 @@ pub fn joint_coordinates(
     skin: &SkinAtRest,
     joints: &[Point],
     exponent: f64,
-) -> JointCoordinates {
+    part: &Part,
+) -> Result<JointCoordinates, Cancelled> {
     let surface = Surface::new(skin.vertices, skin.triangles);
-    let found: Vec<_> = (0..joints.len())
+    let count = part.count(joints.len());
+    let found = (0..joints.len())
         .into_par_iter()
         .map_init(Scratch::default, |scratch, joint| {
             let masses = masses(&surface, skin, joint, &joints[joint], exponent, scratch);
-            masses.map(|m| max_entropy_coordinates(cage.vertices(), &joints[joint], &m))
+            count.step(1)?;
+            Ok(masses.map(|m| max_entropy_coordinates(cage.vertices(), &joints[joint], &m)))
         })
-        .collect();
+        .collect::<Result<Vec<_>, Cancelled>>()?;
     let mut result = JointCoordinates {
-        coords: coordinates(cage, joints),
+        coords: coordinates(cage, joints, part)?,
         outside_hull: Vec::new(),
         without_locality: Vec::new(),
     };
@@ -71,7 +75,7 @@ pub fn joint_coordinates(
             None => result.without_locality.push(joint),
         }
     }
-    result
+    Ok(result)
 }
 
 /// m = Σ_i mvc_ji · L_ji · φ_i, Eq. (10); `None` when bone `joint` has no locality.

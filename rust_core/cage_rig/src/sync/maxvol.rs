@@ -6,7 +6,8 @@
 //! (max |Φ Φ̃⁻¹| ≤ `max_ratio`). Row-pivoted elimination on the most touched vertices of each
 //! column, then swaps on the whole matrix. Cost: `#M · #C²` plus `#M · #C` a swap.
 
-use crate::linalg::{product, Lu};
+use crate::linalg::{long_product, Lu};
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use rayon::prelude::*;
 
@@ -14,6 +15,9 @@ use rayon::prelude::*;
 const CANDIDATES_PER_COLUMN: usize = 40;
 /// A pivot below this part of its column depends on the columns before it.
 const DEPENDENT: f64 = 1e-13;
+
+/// How many swaps are half of what there may be, for the progress: nobody knows before.
+const USUAL_SWAPS: f64 = 20.0;
 
 /// When to stop swapping.
 #[derive(Debug, Clone, Copy)]
@@ -42,24 +46,25 @@ pub struct MaxVol {
 }
 
 /// Chooses among the rows of `coords` (Φ, `#M by #C`).
-pub fn maxvol(coords: &Rows, options: &MaxVolOptions) -> MaxVol {
+pub fn maxvol(coords: &Rows, options: &MaxVolOptions, part: &Part) -> Result<MaxVol, Cancelled> {
     let wanted = coords.len().min(coords.columns());
     let scale = column_scale(coords);
-    let start = start(coords, &scale, wanted);
+    let [starting, improving] = part.split([1.0, 3.0]);
+    let start = start(coords, &scale, wanted, &starting)?;
     let mut rows: Vec<usize> = start.iter().map(|pivot| pivot.0).collect();
     let independent: Vec<usize> = start.iter().map(|pivot| pivot.1).collect();
     let (mut ratio, mut swaps) = (1.0, 0);
     if !rows.is_empty() && rows.len() < coords.len() {
-        (ratio, swaps) = improve(coords, &scale, &independent, &mut rows, options);
+        (ratio, swaps) = improve(coords, &scale, &independent, &mut rows, options, &improving)?;
     }
     fill_up(coords, &mut rows, wanted);
-    MaxVol { rows, ratio, swaps }
+    Ok(MaxVol { rows, ratio, swaps })
 }
 
 /// max |Φ Φ̃⁻¹| of a given choice of as many rows as columns.
-pub fn ratio_of(coords: &Rows, rows: &[usize]) -> f64 {
+pub fn ratio_of(coords: &Rows, rows: &[usize], part: &Part) -> Result<f64, Cancelled> {
     let all: Vec<usize> = (0..coords.columns()).collect();
-    largest(&ratios(coords, &column_scale(coords), &all, rows)).2
+    Ok(largest(&ratios(coords, &column_scale(coords), &all, rows, part)?).2)
 }
 
 /// One over the largest entry of each column (0 for a column of zeros). Scaling columns changes
@@ -81,7 +86,13 @@ fn scaled(coords: &Rows, scale: &[f64], rows: &[usize]) -> Rows {
 }
 
 /// B = Φ Φ̃⁻¹ over the independent columns, without a copy of Φ: Φ D (Φ̃ D)⁻¹ with D the scale.
-fn ratios(coords: &Rows, scale: &[f64], independent: &[usize], rows: &[usize]) -> Rows {
+fn ratios(
+    coords: &Rows,
+    scale: &[f64],
+    independent: &[usize],
+    rows: &[usize],
+    part: &Part,
+) -> Result<Rows, Cancelled> {
     let anchors = scaled(coords, scale, rows);
     let mut square = Rows::zeros(rows.len(), independent.len());
     for i in 0..rows.len() {
@@ -93,45 +104,51 @@ fn ratios(coords: &Rows, scale: &[f64], independent: &[usize], rows: &[usize]) -
     for (i, &k) in independent.iter().enumerate() {
         right.row_mut(k).iter_mut().zip(inverse.row(i)).for_each(|(x, y)| *x = scale[k] * y);
     }
-    product(coords, &right)
+    long_product(coords, &right, part)
 }
 
 /// Pivots (row, column) of an elimination on the most touched rows, on all of them if those do
 /// not reach the full rank.
-fn start(coords: &Rows, scale: &[f64], wanted: usize) -> Vec<(usize, usize)> {
-    let candidates = most_touched(coords);
-    let pivots = eliminate(scaled(coords, scale, &candidates));
+fn start(coords: &Rows, scale: &[f64], wanted: usize, part: &Part) -> Result<Vec<(usize, usize)>, Cancelled> {
+    let [choosing, eliminating] = part.split([2.0, 1.0]);
+    let candidates = most_touched(coords, &choosing)?;
+    let pivots = eliminate(scaled(coords, scale, &candidates), &eliminating)?;
     if pivots.len() < wanted && candidates.len() < coords.len() {
         let all: Vec<usize> = (0..coords.len()).collect();
-        return eliminate(scaled(coords, scale, &all));
+        return eliminate(scaled(coords, scale, &all), &eliminating);
     }
-    pivots.into_iter().map(|(row, column)| (candidates[row], column)).collect()
+    Ok(pivots.into_iter().map(|(row, column)| (candidates[row], column)).collect())
 }
 
-fn most_touched(coords: &Rows) -> Vec<usize> {
+fn most_touched(coords: &Rows, part: &Part) -> Result<Vec<usize>, Cancelled> {
     let count = CANDIDATES_PER_COLUMN.min(coords.len());
-    let mut chosen: Vec<usize> = (0..coords.columns())
+    let columns = part.count(coords.columns());
+    let chosen = (0..coords.columns())
         .into_par_iter()
-        .flat_map_iter(|column| {
+        .map(|column| {
             let mut rows: Vec<usize> = (0..coords.len()).collect();
             if count < rows.len() {
                 let entry = |i: usize| coords.row(i)[column].abs();
                 rows.select_nth_unstable_by(count, |&i, &k| entry(k).total_cmp(&entry(i)).then(i.cmp(&k)));
             }
             rows.truncate(count);
-            rows
+            columns.step(1)?;
+            Ok(rows)
         })
-        .collect();
+        .collect::<Result<Vec<_>, Cancelled>>()?;
+    let mut chosen = chosen.concat();
     chosen.sort_unstable();
     chosen.dedup();
-    chosen
+    Ok(chosen)
 }
 
 /// Gaussian elimination with row pivots, column by column, skipping dependent columns.
-fn eliminate(mut work: Rows) -> Vec<(usize, usize)> {
+fn eliminate(mut work: Rows, part: &Part) -> Result<Vec<(usize, usize)>, Cancelled> {
     let mut free = vec![true; work.len()];
     let mut pivots = Vec::with_capacity(work.columns());
+    let columns = part.count(work.columns());
     for column in 0..work.columns() {
+        columns.step(1)?;
         let entry = |i: usize| work.row(i)[column].abs();
         let best = (0..work.len())
             .filter(|&i| free[i])
@@ -150,7 +167,7 @@ fn eliminate(mut work: Rows) -> Vec<(usize, usize)> {
             }
         }
     }
-    pivots
+    Ok(pivots)
 }
 
 /// Swaps a chosen row for the row that depends on it most, until no ratio is above the limit.
@@ -162,11 +179,13 @@ fn improve(
     independent: &[usize],
     rows: &mut [usize],
     options: &MaxVolOptions,
-) -> (f64, usize) {
+    part: &Part,
+) -> Result<(f64, usize), Cancelled> {
+    let [first, swapping] = part.split([1.0, 4.0]);
     let mut swaps = 0;
     loop {
         let before = swaps;
-        let mut ratios = ratios(coords, scale, independent, rows);
+        let mut ratios = ratios(coords, scale, independent, rows, &first)?;
         let fresh = largest(&ratios).2;
         loop {
             let (row, column, ratio) = largest(&ratios);
@@ -176,9 +195,10 @@ fn improve(
             swap(&mut ratios, row, column);
             rows[column] = row;
             swaps += 1;
+            swapping.reach(1.0 - 1.0 / (1.0 + swaps as f64 / USUAL_SWAPS))?;
         }
         if swaps == before || swaps >= options.max_swaps {
-            return (fresh, swaps);
+            return Ok((fresh, swaps));
         }
     }
 }

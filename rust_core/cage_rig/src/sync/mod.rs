@@ -23,6 +23,7 @@ pub mod reach;
 pub mod rest_centers;
 pub mod rest_skin;
 pub mod skeleton_updater;
+pub mod stages;
 mod work;
 
 #[cfg(test)]
@@ -37,12 +38,15 @@ pub use work::Work;
 use crate::cage::Cage;
 use crate::error::{CageError, Error, PoseError, SkinError};
 use crate::points::{bounding_diagonal, first_not_finite, Matrix3, Point, Transform};
+use crate::progress::{unwatched, Cancelled, Part, Progress};
 use crate::rows::Rows;
 use crate::skinning::{SkinningInput, SkinningMethod};
 use cage_reverser::CageReverser;
 use ground::Ground;
 use rest_centers::RestCenters;
 use skeleton_updater::JointMotion;
+use stages::Stages;
+use std::sync::Arc;
 use work::Stale;
 
 /// A posed cage edit has arrived when it misses by this part of the size.
@@ -52,10 +56,21 @@ const REACHED: f64 = 1e-10;
 /// Solves an edit may take: one, and refinements where Eq. (19) is badly conditioned.
 const SOLVES: usize = 4;
 
+/// Centers of rotation that a rig has not needed yet. Knows all that they depend on.
+#[derive(Debug, Clone)]
+pub struct DueCenters(Arc<Binding>);
+
+impl DueCenters {
+    /// Integrates them, for [`CoupledRig::take_centers`].
+    pub fn integrate(&self, part: &Part) -> Result<RestCenters, Cancelled> {
+        self.0.integrate_centers(part)
+    }
+}
+
 /// A character bound to a cage and a skeleton. Rig space throughout.
 #[derive(Debug, Clone)]
 pub struct CoupledRig {
-    binding: Binding,
+    binding: Arc<Binding>,
     method: &'static SkinningMethod,
     centers: Option<RestCenters>,
     rest_cage: Vec<Point>,
@@ -74,13 +89,23 @@ pub struct CoupledRig {
 impl CoupledRig {
     /// Binds: everything is precomputed here.
     pub fn new(input: BindInput) -> Result<Self, Error> {
-        let method = input.method;
-        let mut binding = Binding::new(input)?;
-        let ground = Ground::new(&binding);
+        Self::bind(input, &Progress::default())
+    }
+
+    /// Binds, telling its progress. Cancelled it stops within some 50 ms, a little more where a cage
+    /// has hundreds of vertices: decompositions of `#C by #C` matrices can't be interrupted.
+    pub fn bind(input: BindInput, progress: &Progress) -> Result<Self, Error> {
+        let (method, stages) = (input.method, Stages::new(&input, progress));
+        let mut binding = Binding::new(input, &stages)?;
+        let ground = Ground::new(&binding, &stages.surroundings)?;
+        let centers = match binding.center_coords.take() {
+            Some(coords) => Some(binding.given_centers(coords, &stages.centers)?),
+            None => None,
+        };
         let joints = ground.joints(&binding, binding.cage.vertices());
         let rest = binding.rest_skin.at_bind().to_vec();
         let mut rig = Self {
-            centers: binding.center_coords.take().map(|coords| binding.given_centers(coords)),
+            centers,
             rest_cage: binding.cage.vertices().to_vec(),
             motions: vec![JointMotion { linear: Matrix3::identity(), step: Point::zeros() }; joints.len()],
             ground,
@@ -93,9 +118,12 @@ impl CoupledRig {
             reverser: None,
             work: Work { anchor_factorisations: 1, ..Work::default() },
             method,
-            binding,
+            binding: Arc::new(binding),
         };
-        rig.integrate_centers();
+        if let Some(due) = rig.due_centers(method) {
+            rig.take_centers(due.integrate(&stages.centers)?);
+        }
+        stages.end()?;
         Ok(rig)
     }
 
@@ -193,19 +221,27 @@ impl CoupledRig {
     }
 
     /// How bones move the visible skin from now on. Nothing else depends on it: cages, joints and
-    /// transforms stay as they are. The first method with centers of rotation integrates them.
+    /// transforms stay as they are. Integrates the centers of rotation where they are due.
     pub fn set_method(&mut self, method: &'static SkinningMethod) {
+        if let Some(due) = self.due_centers(method) {
+            self.take_centers(unwatched(|part| due.integrate(part)));
+        }
         if method.number != self.method.number {
             self.method = method;
             self.stale.posed_skin = true;
-            self.integrate_centers();
         }
     }
 
-    /// Λ, once, when a method needs it and it was not given.
-    fn integrate_centers(&mut self) {
-        if self.method.centers && self.centers.is_none() {
-            self.centers = Some(self.binding.integrate_centers());
+    /// The centers of rotation, where `method` is the first that needs them and they were not given.
+    /// They can be integrated beside the rig, which goes on meanwhile with the method that it has.
+    pub fn due_centers(&self, method: &SkinningMethod) -> Option<DueCenters> {
+        (method.centers && self.centers.is_none()).then(|| DueCenters(Arc::clone(&self.binding)))
+    }
+
+    /// Takes what [`Self::due_centers`] gave, integrated.
+    pub fn take_centers(&mut self, centers: RestCenters) {
+        if self.centers.is_none() {
+            self.centers = Some(centers);
             self.work.center_integrations += 1;
         }
     }
@@ -257,7 +293,7 @@ impl CoupledRig {
             None => {
                 self.work.reverse_factorisations += 1;
                 let linear: Vec<Matrix3> = self.motions.iter().map(|m| m.linear).collect();
-                let Binding { cage_updater, skeleton_updater, .. } = &self.binding;
+                let Binding { cage_updater, skeleton_updater, .. } = &*self.binding;
                 CageReverser::new(cage_updater, skeleton_updater, &linear, self.ground.shares())?
             }
         };

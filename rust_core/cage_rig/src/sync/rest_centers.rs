@@ -5,6 +5,7 @@
 
 use super::rest_skin::RestSkin;
 use crate::points::Point;
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 
 /// Λ and the centers of the present rest cage.
@@ -18,9 +19,9 @@ pub struct RestCenters {
 
 impl RestCenters {
     /// Keeps `coords` (Λ, `#M by #C`), the centers `at_bind` (p₀, `#M by 3`) and `cage` (C₀, `#C by 3`).
-    pub fn new(coords: Rows, at_bind: &[Point], cage: &[Point]) -> Self {
-        let mover = RestSkin::new(at_bind, cage, &coords);
-        Self { coords, centers: mover.at_bind().to_vec(), mover, stale: true }
+    pub fn new(coords: Rows, at_bind: &[Point], cage: &[Point], part: &Part) -> Result<Self, Cancelled> {
+        let mover = RestSkin::new(at_bind, cage, &coords, part)?;
+        Ok(Self { coords, centers: mover.at_bind().to_vec(), mover, stale: true })
     }
 
     /// Λ.

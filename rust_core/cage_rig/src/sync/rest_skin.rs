@@ -4,6 +4,7 @@
 //! is in Φ, and only the columns of cage vertices that moved cost anything: `#M` per moved vertex.
 
 use crate::points::{to_f32, Point};
+use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use rayon::prelude::*;
 
@@ -23,17 +24,19 @@ pub struct RestSkin {
 impl RestSkin {
     /// Keeps `skin` (`#M by 3`) and `cage` (`#C by 3`) of the bind and `cage_coords`
     /// (`#M by #C`).
-    pub fn new(skin: &[Point], cage: &[Point], cage_coords: &Rows) -> Self {
+    pub fn new(skin: &[Point], cage: &[Point], cage_coords: &Rows, part: &Part) -> Result<Self, Cancelled> {
         let count = skin.len();
         let mut columns = vec![0.0; count * cage.len()];
         // Sixteen columns at a time: a row of Φ is read from memory once for all of them.
-        columns.par_chunks_mut(16 * count.max(1)).enumerate().for_each(|(block, columns)| {
+        let blocks = part.count(cage.len().div_ceil(16));
+        columns.par_chunks_mut(16 * count.max(1)).enumerate().try_for_each(|(block, columns)| {
             for i in 0..count {
                 let entries = &cage_coords.row(i)[16 * block..];
                 columns[i..].iter_mut().step_by(count).zip(entries).for_each(|(x, phi)| *x = *phi as f32);
             }
-        });
-        Self { skin: to_f32(skin), cage: cage.to_vec(), columns }
+            blocks.step(1)
+        })?;
+        Ok(Self { skin: to_f32(skin), cage: cage.to_vec(), columns })
     }
 
     /// M₀, `#M by 3`.

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // every test crate uses a part
 
 pub mod arm;
+pub mod large;
 pub mod random;
 pub mod shapes;
 
