@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the file keeps of a rig's bind: everything that its session is made from."""
+"""What the file keeps of a rig's bind: everything that its session is made from, and what that stands on."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .adapters import coordinates, positions, snapshot
-from .session import Known, SkinSnapshot, Snapshot
+from .session import Below, Known, Session, SkinSnapshot, Snapshot
 
 
 def read(cage: bpy.types.Object) -> Snapshot:
@@ -32,6 +32,18 @@ def read(cage: bpy.types.Object) -> Snapshot:
         positions.read_faces(settings.snapshot),
         settings.method.lower(),
         _read_known(settings),
+    )
+
+
+def below(cage: bpy.types.Object, lower: Session) -> Below:
+    """The session of the rig that this one stands on, and which skins and joints they share."""
+    settings, other = cage.cage_rig, cage.cage_rig.input.cage_rig
+    skins = {skin.object: index for index, skin in enumerate(other.skins)}
+    joints = {joint.name: index for index, joint in enumerate(other.joints)}
+    return Below(
+        lower,
+        [skins.get(skin.object, -1) for skin in settings.skins],
+        np.array([joints.get(joint.name, -1) for joint in settings.joints], np.int64),
     )
 
 

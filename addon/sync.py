@@ -229,15 +229,9 @@ def _below(cage: bpy.types.Object) -> Below | None:
     lower = cage.cage_rig.input
     if lower is None:
         return None
-    skins = {skin.object: index for index, skin in enumerate(lower.cage_rig.skins)}
-    joints = {joint.name: index for index, joint in enumerate(lower.cage_rig.joints)}
     if lower.session_uid not in _running:
         raise SessionError(f"'{lower.name}', on which it stands, is not evaluated; show it in this view layer")
-    return Below(
-        _running[lower.session_uid].session,
-        [skins.get(skin.object, -1) for skin in cage.cage_rig.skins],
-        np.array([joints.get(joint.name, -1) for joint in cage.cage_rig.joints], np.int64),
-    )
+    return binding.below(cage, _running[lower.session_uid].session)
 
 
 def _recall(cage: bpy.types.Object, running: _Running, rest: Points, posed: Points) -> str:

@@ -29,7 +29,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "lifecycle": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "props", "reading", "session", "sync"}),
     "bake": (
-        {"bpy", "mathutils", "numpy", "pathlib", "struct"},
+        {"bpy", "mathutils", "numpy", "pathlib", "shutil", "struct"},
         {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
     ),
     "exchange": ({"numpy", "pathlib", "zipfile"}, {"exchange"}),
@@ -52,7 +52,12 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"blf", "bpy", "gpu", "gpu_extras", "mathutils", "numpy"},
         {"adapters", "health", "props", "registry", "session", "sync", "ui"},
     ),
-    "__init__": (set(), {"handlers", "operators", "props", "ui"}),
+    "headless": (
+        {"argparse", "bpy", "json", "mathutils", "numpy", "pathlib", "sys", "time", "zipfile"},
+        {"adapters", "bake", "binding", "headless", "registry", "session", "sync"},
+    ),
+    "__init__": (set(), {"handlers", "headless", "operators", "props", "ui"}),
+    "__main__": ({"addon_utils", "bpy", "importlib", "pathlib", "sys"}, set()),
 }
 STANDARD = {"__future__", "atexit", "collections", "contextlib", "dataclasses", "enum", "functools", "itertools"}
 STANDARD |= {"math", "re", "textwrap", "typing", "uuid"}

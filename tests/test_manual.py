@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 PAGE = DOCS / "problems.md"
-NOT_SHOWN = {"description", "name", "bl_label"}  # tooltips and labels: Blender shows them where they belong
+NOT_SHOWN = {"description", "name", "bl_label", "help", "HELP"}  # shown where they belong: tooltips, labels, --help
 MENUS = {"_import_menu", "_export_menu"}
 
 
