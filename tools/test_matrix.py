@@ -49,7 +49,7 @@ def environment(target: Target) -> Path | None:
     if base is None:
         return None
     subprocess.run([base, "-m", "venv", "--clear", str(folder)], check=True)
-    install = [str(python), "-m", "pip", "install", "--quiet", f"bpy=={target.bpy}", "numpy", "pytest"]
+    install = [str(python), "-m", "pip", "install", "--quiet", f"bpy=={target.bpy}", "numpy", "openjd-cli", "pytest"]
     if subprocess.run(install, check=False).returncode:
         return None
     (folder / "ready").touch()

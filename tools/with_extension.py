@@ -12,7 +12,7 @@ import extension
 def main() -> None:
     script = Path(sys.argv[1]).resolve()
     sys.argv = sys.argv[1:]
-    sys.path[:0] = [str(script.parent), str(script.parent.parent)]
+    sys.path[:0] = [str(script.parent), str(script.parent.parent), str(extension.ROOT)]
     extension.isolate()
     extension.install()
     runpy.run_path(str(script), run_name="__main__")
