@@ -4,28 +4,23 @@
 from __future__ import annotations
 
 import uuid
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, is_dataclass, replace
+from functools import partial
+from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from . import binding, layers, props, reading, sync
-from .adapters import armature, modifier, positions, shape_keys, snapshot, stack
+from .adapters import armature, positions, shape_keys, stack
+from .installation import Bound, install, leave, remove_mesh, remove_object
 from .reading import BindError
-from .session import Known, Session, SessionError, Snapshot
+from .session import BindJob, Known, Session, SessionError, Snapshot
 
 Matrix = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class _Bound:
-    """What a bind has read: the core's snapshot, and what only Blender needs of it."""
-
-    snapshot: Snapshot
-    bone_names: list[str]
-    skin_to_rig: list[Matrix]
-    cage_to_rig: Matrix
 
 
 def bind(
@@ -42,25 +37,8 @@ def bind(
     Where another rig of this armature deforms one of the skins already, the new one stands on it. What is `known`, from
     a `source` that the artist is told, is not computed. Raises `BindError`, with nothing changed, where it can't be.
     """
-    _refuse_cage(cage)
-    lower = _rig_below(armature_object, skins)
-    bound = _read(context, cage, armature_object, skins)
-    bound = replace(bound, snapshot=replace(bound.snapshot, known=known or Known()))
-    session = _compute(cage, bound)
-    settings = cage.cage_rig
-    settings.version, settings.armature, settings.input = props.VERSION, armature_object, lower
-    settings.coordinates = source
-    if lower is not None:
-        settings.method = lower.cage_rig.method
-    elif all(stack.preserves_volume(obj, armature_object) for obj in skins):
-        settings.method = "DQS"
-    for obj in skins:
-        settings.skins.add().object = obj
-    try:
-        _install(context, cage, bound, session)
-    except Exception:
-        unbind(cage)
-        raise
+    plan = _plan_bind(context, cage, armature_object, *skins, known=known or Known(), source=source)
+    plan.write(context, _compute(cage, plan.bound))
 
 
 def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> str:
@@ -69,6 +47,114 @@ def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> str:
     Skins that were deleted are forgotten. Coordinates that were loaded stay while the rest shape is what they were
     loaded for; returns a sentence on those that did not. Raises `BindError`, with nothing changed, where it can't be.
     """
+    plan = _plan_rebind(context, cage)
+    return plan.write(context, _compute(cage, plan.bound))
+
+
+def begin_bind(
+    context: bpy.types.Context,
+    cage: bpy.types.Object,
+    armature_object: bpy.types.Object,
+    skins: list[bpy.types.Object],
+) -> Work:
+    """Begin to `bind` in a thread."""
+    return Work(context, _plan_bind, cage, armature_object, *skins)
+
+
+def begin_rebind(context: bpy.types.Context, cage: bpy.types.Object) -> Work:
+    """Begin to `rebind` in a thread; the rig goes on as it is until then."""
+    return Work(context, _plan_rebind, cage)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """A bind that is read and not refused."""
+
+    bound: Bound
+    write: Callable[[bpy.types.Context, Session], str]  # returns a sentence that the artist should know, or nothing
+
+
+class Work:
+    """A bind under way: all is read, the core computes in a thread, nothing is written. Dropped, it is cancelled."""
+
+    def __init__(
+        self, context: bpy.types.Context, plan: Callable[..., _Plan], cage: bpy.types.Object, *others: bpy.types.Object
+    ) -> None:
+        self.name = cage.name
+        self._read, self._objects = plan, [obj.session_uid for obj in (cage, *others)]
+        self._plan = plan(context, cage, *others)
+        with _refusals(self.name):
+            self.job = BindJob(self._plan.bound.snapshot)
+
+    def finish(self, context: bpy.types.Context, *, later: bool) -> tuple[bpy.types.Object, str]:
+        """Wait for the core and write: the rig's cage, and a sentence that the artist should know, or nothing.
+
+        `later`: others may have worked since it began, so everything is read again. Raises `BindError`, with nothing
+        changed, where it is not what it was.
+        """
+        with _refusals(self.name):
+            session = self.job.result()
+        there = {obj.session_uid: obj for obj in bpy.data.objects if not later or obj.users_collection}
+        found = [there.get(uid) for uid in self._objects]
+        plan = self._plan
+        if later:
+            whole = context.mode == "OBJECT" and None not in found
+            plan = self._read(context, *found) if whole else None
+        if plan is None or not _same(plan.bound, self._plan.bound):
+            raise BindError(
+                f"'{self.name}', its armature or its skins were changed while they were being bound, so nothing was "
+                "bound; bind again"
+            )
+        return found[0], plan.write(context, session)
+
+
+def _plan_bind(
+    context: bpy.types.Context,
+    cage: bpy.types.Object,
+    armature_object: bpy.types.Object,
+    *skins: bpy.types.Object,
+    known: Known | None = None,
+    source: str = "",
+) -> _Plan:
+    method = "LBS" if _is_copy(cage) else cage.cage_rig.method
+    lower = _rig_below(armature_object, skins)
+    if lower is not None:
+        method = lower.cage_rig.method
+    elif all(stack.preserves_volume(obj, armature_object) for obj in skins):
+        method = "DQS"
+    bound = _read(context, cage, armature_object, skins, method)
+    bound = replace(bound, snapshot=replace(bound.snapshot, known=known or Known()))
+
+    return _Plan(
+        bound, partial(_write_bind, cage=cage, objects=(armature_object, lower, skins), bound=bound, source=source)
+    )
+
+
+def _write_bind(
+    context: bpy.types.Context,
+    session: Session,
+    *,
+    cage: bpy.types.Object,
+    objects: tuple[bpy.types.Object, bpy.types.Object | None, tuple[bpy.types.Object, ...]],
+    bound: Bound,
+    source: str,
+) -> str:
+    if cage.cage_rig.state != "NONE":
+        unbind(cage)  # a copy of a bound cage starts anew
+    settings = cage.cage_rig
+    settings.version, settings.coordinates, settings.method = props.VERSION, source, bound.snapshot.method.upper()
+    settings.armature, settings.input, skins = objects
+    for obj in skins:
+        settings.skins.add().object = obj
+    try:
+        install(context, cage, bound, session)
+    except Exception:
+        unbind(cage)
+        raise
+    return ""
+
+
+def _plan_rebind(context: bpy.types.Context, cage: bpy.types.Object) -> _Plan:
     settings = cage.cage_rig
     _refuse_override(cage)
     if settings.armature is None or not settings.armature.users_collection:
@@ -78,17 +164,29 @@ def rebind(context: bpy.types.Context, cage: bpy.types.Object) -> str:
     skins = [skin.object for skin in settings.skins if skin.object is not None and skin.object.users_collection]
     if not skins:
         raise BindError(f"All skins of '{cage.name}' were deleted; undo, or Unbind")
-    bound, before = _read(context, cage, settings.armature, skins), settings.coordinates
+    bound, before = _read(context, cage, settings.armature, skins, settings.method), settings.coordinates
     fits = bool(before) and _same_rest(cage, bound)
     if fits:
         bound = replace(bound, snapshot=replace(bound.snapshot, known=binding.read(cage).known))
-    session = _compute(cage, bound)
+    return _Plan(bound, partial(_write_rebind, cage=cage, skins=skins, bound=bound, fits=fits))
+
+
+def _write_rebind(
+    context: bpy.types.Context,
+    session: Session,
+    *,
+    cage: bpy.types.Object,
+    skins: list[bpy.types.Object],
+    bound: Bound,
+    fits: bool,
+) -> str:
+    settings, before = cage.cage_rig, cage.cage_rig.coordinates
     for index in reversed(range(len(settings.skins))):
         if settings.skins[index].object not in skins:
-            _remove_mesh(settings.skins[index].snapshot)
+            remove_mesh(settings.skins[index].snapshot)
             settings.skins.remove(index)
     settings.coordinates = before if fits else ""
-    _install(context, cage, bound, session)
+    install(context, cage, bound, session)
     if fits or not before:
         return ""
     return f"The rest shape has changed, so the coordinates of '{before}' were dropped and computed anew"
@@ -112,7 +210,7 @@ def use_coordinates(context: bpy.types.Context, cage: bpy.types.Object, known: K
     sync.start(cage, context.evaluated_depsgraph_get(), session)
 
 
-def _same_rest(cage: bpy.types.Object, bound: _Bound) -> bool:
+def _same_rest(cage: bpy.types.Object, bound: Bound) -> bool:
     """Whether skins, joints and cage rest where they did when the rig was bound."""
     settings, now = cage.cage_rig, bound.snapshot
     if any(skin.snapshot is None for skin in settings.skins) or settings.snapshot is None:
@@ -137,14 +235,14 @@ def unbind(cage: bpy.types.Object) -> None:
         upper.cage_rig.input = settings.input
     for skin in settings.skins:
         if owned and skin.object is not None:
-            _leave(skin.object, cage)
+            leave(skin.object, cage)
         if owned:
-            _remove_mesh(skin.snapshot)
+            remove_mesh(skin.snapshot)
     if owned:
         stack.restore_suspended(cage)
-        _remove_mesh(settings.snapshot)
+        remove_mesh(settings.snapshot)
         for obj in (settings.posed_cage, settings.refit_armature):
-            _remove_object(obj)
+            remove_object(obj)
     cage.property_unset("cage_rig")
     sync.drop(cage)
 
@@ -215,21 +313,22 @@ def summary(cage: bpy.types.Object) -> str:
     return text
 
 
-def _refuse_cage(obj: bpy.types.Object) -> None:
+def _is_copy(obj: bpy.types.Object) -> bool:
+    """Whether a cage that may be bound is a copy of a bound one. Raises `BindError` where it may not."""
     settings = obj.cage_rig
     if settings.state != "NONE":
         owner = settings.posed_cage.cage_rig.owner if settings.posed_cage else obj
         if owner not in (None, obj):
-            unbind(obj)  # a copy of a bound cage: it may start anew
-            return
+            return True
         raise BindError(f"'{obj.name}' is the cage of a rig already; press Rebind, or Unbind it first")
     if settings.part != "NONE" and settings.owner is not None:
         raise BindError(f"'{obj.name}' belongs to the rig of cage '{settings.owner.name}'; Unbind that first")
     if obj.library is not None or obj.data.library is not None:
         raise BindError(f"'{obj.name}' is linked from another file; make it local first")
+    return False
 
 
-def _rig_below(armature_object: bpy.types.Object, skins: list[bpy.types.Object]) -> bpy.types.Object | None:
+def _rig_below(armature_object: bpy.types.Object, skins: tuple[bpy.types.Object, ...]) -> bpy.types.Object | None:
     """The rig that deforms skins of the selection already, on which a new one would stand."""
     lower: bpy.types.Object | None = None
     for obj in skins:
@@ -255,139 +354,45 @@ def _refuse_override(cage: bpy.types.Object) -> None:
         raise BindError(f"'{cage.name}' was bound in another file; open that one to bind anew, or delete it here")
 
 
-def _leave(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
-    """Take one rig off a skin; the last one gives it back as it was."""
-    others = [found for found in modifier.ours(skin) if modifier.read(found, "Rest Cage") not in (cage, None)]
-    if not others:
-        stack.release(skin)
-        return
-    modifier.remove(skin, cage)
-    layers.settle(skin)
-
-
 def _read(
     context: bpy.types.Context,
     cage: bpy.types.Object,
     armature_object: bpy.types.Object,
-    skins: list[bpy.types.Object],
-) -> _Bound:
+    skins: Sequence[bpy.types.Object],
+    method: str,
+) -> Bound:
     found = reading.read(context, armature_object, skins, cage)
     rest, to_rig = found.rest, found.to_rig
-    cage_points = positions.apply_matrix(to_rig[-1], positions.read_base(cage.data))
     core = Snapshot(
         found.skins,
         rest.heads.astype(np.float32).astype(np.float64),
         rest.tails.astype(np.float32).astype(np.float64),
         rest.parents,
-        cage_points,
+        positions.apply_matrix(to_rig[-1], positions.read_base(cage.data)),
         positions.read_faces(cage.data),
-        cage.cage_rig.method.lower(),
+        method.lower(),
     )
-    return _Bound(core, rest.names, to_rig[:-1], to_rig[-1])
+    return Bound(core, rest.names, to_rig[:-1], to_rig[-1])
 
 
-def _compute(cage: bpy.types.Object, bound: _Bound) -> Session:
+def _same(one: Any, other: Any) -> bool:
+    """Whether two binds have read the same, to the last bit."""
+    if is_dataclass(one):
+        return _same(list(vars(one).values()), list(vars(other).values()))
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return bool(np.array_equal(one, other))
+
+
+def _compute(cage: bpy.types.Object, bound: Bound) -> Session:
     """Let the core bind: what it refuses is refused before anything is written."""
-    try:
+    with _refusals(cage.name):
         return Session(bound.snapshot)
+
+
+@contextmanager
+def _refusals(name: str) -> Iterator[None]:
+    try:
+        yield
     except SessionError as error:
-        raise BindError(f"'{cage.name}' can't be bound: {error}") from error
-
-
-def _install(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound, session: Session) -> None:
-    settings = cage.cage_rig
-    sync.drop(cage)
-    _write_joints(cage, bound)
-    settings.bind_id = uuid.uuid4().hex
-    settings.cage_to_rig = bound.cage_to_rig.T.tolist()
-    _remove_mesh(settings.snapshot)
-    settings.snapshot = snapshot.write(f"{cage.name} Bind", bound.snapshot.cage, bound.snapshot.cage_faces, None)
-    _make_posed_cage(context, cage, bound)
-    _make_refit_armature(context, cage)
-    stack.suspend_armature(cage, settings.armature)
-    for index, skin in enumerate(settings.skins):
-        part = bound.snapshot.skins[index]
-        _remove_mesh(skin.snapshot)
-        skin.snapshot = snapshot.write(f"{skin.object.name} Bind", part.points, part.faces, part.weights)
-        skin.skin_to_rig = bound.skin_to_rig[index].T.tolist()
-        _join(skin.object, cage)
-    binding.write_known(cage, bound.snapshot.known)
-    settings.state = "PAUSED"  # a rig until the first update makes it live
-    sync.start(cage, context.evaluated_depsgraph_get(), session)
-
-
-def _join(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
-    settings = cage.cage_rig
-    skin.cage_rig.part = "SKIN"
-    ours = modifier.find(skin, cage)
-    if ours is None:
-        modifier.add(skin, cage, settings.posed_cage, stack.place(skin, settings.armature))
-    else:
-        modifier.set_inputs(ours, {"Posed Cage": settings.posed_cage})
-    layers.settle(skin)
-    stack.suspend_armature(skin, settings.armature)
-
-
-def _write_joints(cage: bpy.types.Object, bound: _Bound) -> None:
-    joints = cage.cage_rig.joints
-    joints.clear()
-    weighted = set(np.concatenate([skin.weights[1] for skin in bound.snapshot.skins]).tolist())
-    for k, name in enumerate(bound.bone_names):
-        joint = joints.add()
-        joint.name, joint.parent = name, int(bound.snapshot.parents[k])
-        joint.weighted = k in weighted
-        joint.head, joint.tail = bound.snapshot.heads[k], bound.snapshot.tails[k]
-
-
-def _make_posed_cage(context: bpy.types.Context, cage: bpy.types.Object, bound: _Bound) -> None:
-    """The posed cage: a mesh of the cage's faces in rig space, parented to the armature."""
-    settings = cage.cage_rig
-    mesh = positions.new_mesh(f"{cage.name} Posed", bound.snapshot.cage, bound.snapshot.cage_faces)
-    positions.add_layers(mesh, sync.MEMORY)
-    obj = settings.posed_cage
-    if obj is None:
-        obj = bpy.data.objects.new(mesh.name, mesh)
-        obj.display_type, obj.show_in_front, obj.hide_render = "WIRE", True, True
-        settings.posed_cage = obj
-    else:
-        old, obj.data = obj.data, mesh
-        mesh.name = old.name
-        _remove_mesh(old)
-    _attach(context, obj, cage, "POSED_CAGE")
-    armature.depend_on_bones(obj, settings.armature, bound.bone_names)
-
-
-def _make_refit_armature(context: bpy.types.Context, cage: bpy.types.Object) -> None:
-    settings = cage.cage_rig
-    _remove_object(settings.refit_armature)
-    data = armature.new_refit_armature(f"{cage.name} Refit", settings.armature.data)
-    obj = bpy.data.objects.new(data.name, data)
-    obj.show_in_front, obj.hide_render = True, True
-    settings.refit_armature = obj
-    _attach(context, obj, cage, "REFIT_ARMATURE")
-    armature.free_bones(obj, context)
-
-
-def _attach(context: bpy.types.Context, obj: bpy.types.Object, cage: bpy.types.Object, part: str) -> None:
-    obj.cage_rig.part, obj.cage_rig.owner = part, cage
-    obj.parent = cage.cage_rig.armature
-    obj.matrix_parent_inverse.identity()
-    obj.matrix_basis.identity()
-    if not obj.users_collection:
-        collections = cage.users_collection or (context.scene.collection,)
-        collections[0].objects.link(obj)
-
-
-def _remove_mesh(mesh: bpy.types.Mesh | None) -> None:
-    """Remove a rig's mesh, unless a duplicate of the character has it too."""
-    if mesh is not None and mesh.library is None and mesh.users <= 1:
-        bpy.data.meshes.remove(mesh)
-
-
-def _remove_object(obj: bpy.types.Object | None) -> None:
-    if obj is None:
-        return
-    data = obj.data
-    bpy.data.objects.remove(obj)
-    if data.users == 0:
-        bpy.data.batch_remove([data])
+        raise BindError(f"'{name}' can't be bound: {error}") from error

@@ -18,7 +18,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import layers
+from . import choosing, layers
 
 VERSION = 1
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
@@ -45,6 +45,12 @@ PARTS = [
 def _tag(settings: CageRigSettings, _context: bpy.types.Context) -> None:
     """A setting changed: let Blender update the rig."""
     settings.id_data.update_tag()
+
+
+def _choose(settings: CageRigSettings, context: bpy.types.Context) -> None:
+    """The method changed."""
+    choosing.chosen(settings.id_data, context)
+    _tag(settings, context)
 
 
 def _may_be_input(settings: CageRigSettings, obj: bpy.types.Object) -> bool:
@@ -98,7 +104,7 @@ class CageRigSettings(bpy.types.PropertyGroup):
         name="Method",
         description="How bones deform the skin",
         default="LBS",
-        update=_tag,
+        update=_choose,
         override=OVERRIDABLE,
     )
     influence: FloatProperty(

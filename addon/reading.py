@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class Character:
 def read(
     context: bpy.types.Context,
     armature_object: bpy.types.Object,
-    skins: list[bpy.types.Object],
+    skins: Sequence[bpy.types.Object],
     *others: bpy.types.Object,
 ) -> Character:
     """Read the skins' base meshes and weights and the rest bones. Object Mode.

@@ -39,7 +39,7 @@ def _door(function: Callable[P, R]) -> Callable[P, R]:
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return function(*args, **kwargs)
-        except ValueError as error:
+        except (ValueError, cage_rig_core.Cancelled) as error:
             raise SessionError(str(error)) from error
         except cage_rig_core.PanicException as panic:
             raise SessionCrash(f"internal error of the core ({panic}); please report it") from None
@@ -93,22 +93,13 @@ class Session:
     """One bound rig. `play`, `edit_posed_cage` and the results mirror the core's edits and structures."""
 
     @_door
-    def __init__(self, snapshot: Snapshot) -> None:
+    def __init__(self, snapshot: Snapshot, job: cage_rig_core.BindJob | None = None) -> None:
+        """Bind, or take the result of a job that binds `snapshot`."""
         self.snapshot = snapshot
         skins = snapshot.skins
         counts = [len(skin.points) for skin in skins]
-        self.starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
-        self.rig = cage_rig_core.CoupledRig(
-            np.concatenate([skin.points for skin in skins]),
-            _join_faces(skins, self.starts),
-            _join_weights(skins),
-            snapshot.heads,
-            snapshot.parents,
-            snapshot.cage,
-            snapshot.cage_faces,
-            method=snapshot.method,
-            **vars(snapshot.known),
-        )
+        self.starts = _starts(skins)
+        self.rig = cage_rig_core.CoupledRig(**_to_core(snapshot)) if job is None else job.result()
         self.influence = 1.0
         self.revision = 0  # grows whenever a result may have changed
         self._links = _tail_links(snapshot)
@@ -159,6 +150,22 @@ class Session:
         if name != self.rig.method:
             self.rig.set_method(name)
             self.revision += 1
+
+    @_door
+    def start_method(self, name: str) -> cage_rig_core.MethodJob:
+        """Begin to prepare this method in a thread. The method stays what it is until `take_method`."""
+        return self.rig.start_method(name)
+
+    @_door
+    def take_method(self, job: cage_rig_core.MethodJob) -> None:
+        """Choose the method that a job has prepared; waits for it."""
+        job.result()
+        self.revision += 1
+
+    @property
+    def method(self) -> str:
+        """How bones deform the skin."""
+        return str(self.rig.method)
 
     @_door
     def edit_posed_cage(self, posed_cage: Points) -> NDArray[np.float64]:
@@ -319,6 +326,37 @@ class Session:
         return self.rig.transforms @ moved
 
 
+class BindJob:
+    """A bind in a thread of the core's. Its result is a `Session`, to the last bit that of `Session(snapshot)`."""
+
+    @_door
+    def __init__(self, snapshot: Snapshot) -> None:
+        self._snapshot = snapshot
+        self._job = cage_rig_core.BindJob(**_to_core(snapshot))
+
+    @property
+    def progress(self) -> float:
+        """How much is done, 0 to 1."""
+        return self._job.progress
+
+    @property
+    def stage(self) -> str:
+        """What is being computed, for people."""
+        return self._job.stage
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until it is done, or for so long; whether it is done."""
+        return self._job.wait(seconds)
+
+    def cancel(self) -> None:
+        """Stop it soon."""
+        self._job.cancel()
+
+    def result(self) -> Session:
+        """The session; waits for it. Raises `SessionError` where the core refuses, or when it was cancelled."""
+        return Session(self._snapshot, self._job)
+
+
 @_door
 def mean_value_coordinates(points: Points, cage: Points, cage_faces: Faces) -> Matrices:
     """The coordinates that a bind computes (`#M by #C`), of `points` with respect to a cage."""
@@ -335,6 +373,27 @@ def _same(new: NDArray[np.float32] | None, old: NDArray[np.float32] | None) -> b
     if new is None or old is None:
         return new is old
     return np.array_equal(new, old)
+
+
+def _to_core(snapshot: Snapshot) -> dict[str, Any]:
+    """What the core binds, by its names."""
+    skins = snapshot.skins
+    return {
+        "skin_vertices": np.concatenate([skin.points for skin in skins]),
+        "skin_faces": _join_faces(skins, _starts(skins)),
+        "skin_weights": _join_weights(skins),
+        "joints": snapshot.heads,
+        "parents": snapshot.parents,
+        "cage_vertices": snapshot.cage,
+        "cage_faces": snapshot.cage_faces,
+        "method": snapshot.method,
+        **vars(snapshot.known),
+    }
+
+
+def _starts(skins: list[SkinSnapshot]) -> NDArray[np.int_]:
+    """Where each skin begins among all vertices, and their count."""
+    return np.concatenate([[0], np.cumsum([len(skin.points) for skin in skins])]).astype(int)
 
 
 def _join_faces(skins: list[SkinSnapshot], starts: NDArray[np.int_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

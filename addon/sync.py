@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import binding, health, layers, linked, registry, skins
+from . import binding, choosing, health, layers, linked, registry, skins
 from .adapters import armature, cage_keys, modifier, positions, shape_keys, stack
 from .session import Below, Session, SessionCrash, SessionError
 
@@ -61,12 +61,14 @@ def forget() -> None:
     """Drop every session: after loading a file, and when the add-on goes."""
     _running.clear()
     _again.clear()
+    choosing.forget()
     registry.forget()
 
 
 def drop(cage: bpy.types.Object) -> None:
     """Drop one rig's session: its snapshot changed."""
     _running.pop(cage.session_uid, None)
+    choosing.drop(cage)
     registry.forget()
 
 
@@ -202,7 +204,9 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     transforms, rest_joints = _read_pose(cage, running, depsgraph)
     shown = cage.evaluated_get(depsgraph).cage_rig  # both may be animated
     influence = float(shown.influence)
-    session.set_method(shown.method.lower())
+    later = event is Event.RESTORED or choosing.is_by_hand(cage) or choosing.progress(cage) is not None
+    later &= depsgraph.mode == "VIEWPORT" and not _rendering
+    choosing.use(cage, session, shown.method.lower(), later=later)
     rest = _read_rest_cage(cage, depsgraph)
     if len(rest) != len(session.snapshot.cage):
         raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")

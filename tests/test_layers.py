@@ -16,7 +16,8 @@ CORE = ROOT / "rust_core/cage_rig/src"
 # What a module of the add-on may import: packages from outside, and modules of ours.
 ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "compat": ({"bpy"}, set()),
-    "props": ({"bpy"}, {"layers"}),
+    "props": ({"bpy"}, {"choosing", "layers"}),
+    "choosing": ({"bpy"}, {"session"}),
     "session": ({"cage_rig_core", "numpy"}, set()),
     "adapters": ({"bpy", "bmesh", "mathutils", "numpy"}, {"adapters", "compat"}),
     "layers": ({"bpy"}, {"adapters"}),
@@ -25,9 +26,16 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
-    "sync": ({"bpy", "numpy"}, {"adapters", "binding", "health", "layers", "linked", "registry", "session", "skins"}),
+    "sync": (
+        {"bpy", "numpy"},
+        {"adapters", "binding", "choosing", "health", "layers", "linked", "registry", "session", "skins"},
+    ),
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
-    "lifecycle": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "props", "reading", "session", "sync"}),
+    "installation": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "session", "sync"}),
+    "lifecycle": (
+        {"bpy", "numpy"},
+        {"adapters", "binding", "installation", "layers", "props", "reading", "session", "sync"},
+    ),
     "bake": (
         {"bpy", "mathutils", "numpy", "pathlib", "shutil", "struct"},
         {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
@@ -46,8 +54,11 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "repair": ({"bpy"}, {"adapters", "lifecycle"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),
-    "operators": ({"bpy"}, {"bake", "exchange", "keying", "lifecycle", "operators", "props", "repair", "selection"}),
-    "ui": ({"bpy"}, {"keying", "props", "repair", "ui"}),
+    "operators": (
+        {"bpy"},
+        {"bake", "choosing", "exchange", "keying", "lifecycle", "operators", "props", "repair", "selection"},
+    ),
+    "ui": ({"bpy"}, {"choosing", "keying", "props", "repair", "ui"}),
     "ui/overlays": (
         {"blf", "bpy", "gpu", "gpu_extras", "mathutils", "numpy"},
         {"adapters", "health", "props", "registry", "session", "sync", "ui"},

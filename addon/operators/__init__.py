@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import bpy
 
+from . import waiting
 from .apply_refit import CAGE_RIG_OT_apply_refit
 from .bake import CAGE_RIG_OT_bake
 from .bind import CAGE_RIG_OT_bind
+from .cancel_method import CAGE_RIG_OT_cancel_method
 from .delete_key import CAGE_RIG_OT_delete_key
 from .discard_edit import CAGE_RIG_OT_discard_edit
 from .drop_coordinates import CAGE_RIG_OT_drop_coordinates
@@ -27,6 +29,7 @@ CLASSES = (
     CAGE_RIG_OT_rebind,
     CAGE_RIG_OT_unbind,
     CAGE_RIG_OT_apply_refit,
+    CAGE_RIG_OT_cancel_method,
     CAGE_RIG_OT_bake,
     CAGE_RIG_OT_key_cage,
     CAGE_RIG_OT_key_envelope,
@@ -71,6 +74,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    waiting.end_all()
     for menu, draw in MENUS:
         menu.remove(draw)
     for cls in reversed(CLASSES):

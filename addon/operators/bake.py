@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from .. import bake, props, selection
 from ..bake import mesh_cache, native_rig, scenes, shape_keys
+from . import waiting
 
 # Numbers never move: they are what keymaps and presets store.
 TARGETS = [
@@ -61,6 +62,7 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
 
     by_hand = False  # from a menu or a button, not by a script: then the window goes on meanwhile
     _steps: bake.Steps[Any] | None = None
+    _wait: waiting.Wait | None = None
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -90,13 +92,13 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
         self._fill_in(context)
         steps = self._new_steps(props.rig_of(context.object))
         manager = context.window_manager
-        manager.progress_begin(0.0, 100.0)
         if self.by_hand and not bpy.app.background:
             self._steps = steps
-            self._timer = manager.event_timer_add(0.01, window=context.window)
-            self._tell(context, 0.0)
+            self._wait = waiting.Wait(context, "Baking", steps.close, interval=0.01)
+            self._tell(0.0)
             manager.modal_handler_add(self)
             return {"RUNNING_MODAL"}
+        manager.progress_begin(0.0, 100.0)
         try:
             made = bake.run(steps, lambda share: manager.progress_update(100.0 * share))
         except bake.BakeError as error:
@@ -108,14 +110,14 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
         return {"FINISHED"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC" and event.value == "PRESS":
+        if waiting.wants_out(event):
             self.cancel(context)
             self.report({"INFO"}, "Bake cancelled; nothing of it is left")
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}  # nothing else may change what is baked
         try:
-            self._tell(context, next(self._steps))
+            self._tell(next(self._steps))
         except StopIteration as end:
             self.cancel(context)
             self.report({"INFO"}, end.value.summary)
@@ -129,15 +131,10 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
             raise
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context: bpy.types.Context) -> None:
+    def cancel(self, _context: bpy.types.Context) -> None:
         """Take back what is not finished, and give the window back. Blender calls it too when it closes."""
-        if self._steps is None:
-            return
-        self._steps.close()
-        self._steps = None
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
+        if self._wait is not None:
+            self._wait.give_up()
 
     def _fill_in(self, context: bpy.types.Context) -> None:
         """Defaults that depend on the scene and on the target."""
@@ -163,10 +160,7 @@ class CAGE_RIG_OT_bake(bpy.types.Operator):
             case _:
                 return native_rig.steps(cage, *frames, samples=self.samples, keep_action=self.keep_action)
 
-    def _tell(self, context: bpy.types.Context, share: float) -> None:
-        context.window_manager.progress_update(100.0 * share)
-        if self.target in ("ALEMBIC", "USD"):
-            text = "Baking: Blender's exporter is at work, which can't be cancelled"
-        else:
-            text = f"Baking: {share:.0%}   Esc: cancel"
-        context.workspace.status_text_set(text)
+    def _tell(self, share: float) -> None:
+        exporting = self.target in ("ALEMBIC", "USD")
+        stage = "Blender's exporter is at work, which can't be cancelled" if exporting else ""
+        self._wait.tell(share, stage, way_out=not exporting)

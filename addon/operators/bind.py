@@ -6,9 +6,10 @@ from __future__ import annotations
 import bpy
 
 from .. import lifecycle, selection
+from .waiting import Binds
 
 
-class CAGE_RIG_OT_bind(bpy.types.Operator):
+class CAGE_RIG_OT_bind(Binds, bpy.types.Operator):
     """Couple the selected skin meshes, armature and cage. The cage is the mesh that encloses the others, or the active one"""  # noqa: E501
 
     bl_idname = "cage_rig.bind"
@@ -22,12 +23,5 @@ class CAGE_RIG_OT_bind(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            cage, armature, skins = selection.to_bind(context)
-            lifecycle.bind(context, cage, armature, skins)
-        except lifecycle.BindError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, lifecycle.summary(cage))
-        return {"FINISHED"}
+    def begin(self, context: bpy.types.Context) -> lifecycle.Work:
+        return lifecycle.begin_bind(context, *selection.to_bind(context))

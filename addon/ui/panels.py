@@ -7,8 +7,8 @@ import textwrap
 
 import bpy
 
-from .. import keying, repair
-from ..props import rig_of
+from .. import choosing, keying, repair
+from ..props import METHODS, rig_of
 
 ICONS = {"LIVE": "CHECKMARK", "PAUSED": "PAUSE"}
 
@@ -145,7 +145,8 @@ def _draw_state(layout: bpy.types.UILayout, cage: bpy.types.Object, width: int) 
     _draw_text(box, settings.message, width)
     if settings.fix:
         box.separator()
-        box.operator("cage_rig.fix_problem", text=repair.label(settings.fix), icon="TOOL_SETTINGS")
+        fix = "rebind" if settings.fix == "rebind" else "fix_problem"  # a rebind may take long
+        box.operator(f"cage_rig.{fix}", text=repair.label(settings.fix), icon="TOOL_SETTINGS")
 
 
 def _draw_text(layout: bpy.types.UILayout, text: str, width: int) -> None:
@@ -179,9 +180,22 @@ def _draw_settings(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
     column.use_property_split = True
     column.use_property_decorate = False
     column.prop(settings, "method")
+    _draw_choice(column, cage)
     row = column.row(align=True)
     row.use_property_decorate = True
     row.prop(settings, "influence", slider=True)
+
+
+def _draw_choice(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
+    """The method that is being prepared, and what the rig does meanwhile."""
+    found = choosing.progress(cage)
+    if found is None:
+        return
+    share, before = found
+    label = next(label for name, label, *_ in METHODS if name == before)
+    layout.progress(factor=share, text=f"Computing, {share:.0%}")
+    layout.label(text=f"The skin follows {label} until then")
+    layout.operator("cage_rig.cancel_method", icon="X")
 
 
 def _draw_part(layout: bpy.types.UILayout, obj: bpy.types.Object | None, label: str, icon: str) -> None:

@@ -104,6 +104,31 @@ def shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None = None) -
     return points
 
 
+def file_state() -> dict[str, object]:
+    """All that a bind could change in a file, to compare."""
+    state: dict[str, object] = {}
+    for obj in bpy.data.objects:
+        entry: dict[str, object] = {
+            "matrix": [tuple(row) for row in obj.matrix_world],
+            "parent": obj.parent.name if obj.parent else None,
+            "collections": sorted(c.name for c in obj.users_collection),
+            "modifiers": [(m.name, m.type, m.show_viewport, m.show_render) for m in obj.modifiers],
+            "groups": [g.name for g in obj.vertex_groups],
+            "constraints": [c.name for c in obj.constraints],
+            "state": (obj.cage_rig.state, obj.cage_rig.part, obj.cage_rig.owner, len(obj.cage_rig.suspended)),
+        }
+        if obj.type == "MESH":
+            entry["points"] = rest(obj).tobytes()
+            entry["attributes"] = sorted(a.name for a in obj.data.attributes)
+        else:
+            entry["pose"] = obj.data.pose_position
+            entry["bones"] = [(b.name, tuple(b.head_local), b.use_connect) for b in obj.data.bones]
+        state[obj.name] = entry
+    for kind in ("meshes", "armatures", "node_groups", "actions", "collections"):
+        state[kind] = sorted(item.name for item in getattr(bpy.data, kind))
+    return state
+
+
 @contextmanager
 def plain_blender(skin: bpy.types.Object) -> Iterator[None]:
     """Our modifier off and the Armature modifier on: what Blender alone would show."""

@@ -6,34 +6,23 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
-from scene import Rig, bend, bind, bound_bar, build_bar, fat_key, native, rest, select, set_mesh, shown, update
+from scene import (
+    Rig,
+    bend,
+    bind,
+    bound_bar,
+    build_bar,
+    fat_key,
+    file_state,
+    native,
+    rest,
+    select,
+    set_mesh,
+    shown,
+    update,
+)
 
 from blend_fixtures.build import RigObjects
-
-
-def file_state() -> dict[str, object]:
-    """All that a bind could change in a file, to compare."""
-    state: dict[str, object] = {}
-    for obj in bpy.data.objects:
-        entry: dict[str, object] = {
-            "matrix": [tuple(row) for row in obj.matrix_world],
-            "parent": obj.parent.name if obj.parent else None,
-            "collections": sorted(c.name for c in obj.users_collection),
-            "modifiers": [(m.name, m.type, m.show_viewport, m.show_render) for m in obj.modifiers],
-            "groups": [g.name for g in obj.vertex_groups],
-            "constraints": [c.name for c in obj.constraints],
-            "state": (obj.cage_rig.state, obj.cage_rig.part, obj.cage_rig.owner, len(obj.cage_rig.suspended)),
-        }
-        if obj.type == "MESH":
-            entry["points"] = rest(obj).tobytes()
-            entry["attributes"] = sorted(a.name for a in obj.data.attributes)
-        else:
-            entry["pose"] = obj.data.pose_position
-            entry["bones"] = [(b.name, tuple(b.head_local), b.use_connect) for b in obj.data.bones]
-        state[obj.name] = entry
-    for kind in ("meshes", "armatures", "node_groups", "actions", "collections"):
-        state[kind] = sorted(item.name for item in getattr(bpy.data, kind))
-    return state
 
 
 def test_bind_makes_a_live_rig() -> None:
