@@ -1,4 +1,4 @@
-# make demo · test · lint · bench · fixtures · extension · test-matrix · docs · pictures
+# make demo · test · lint · bench · fixtures · zip · extension · test-matrix · docs · pictures
 # Every target sets up what it needs in .venv; nothing but Python, a Rust toolchain and make is assumed.
 
 PYTHON ?= $(shell sh tools/find-python)
@@ -8,7 +8,7 @@ CORE_SOURCES := $(shell find rust_core -name '*.rs' -o -name '*.toml' -o -name '
 ADDON_SOURCES := $(shell find addon -name '*.py' -o -name '*.toml')
 DEMO_OUT ?= build/demo
 
-.PHONY: demo test test-rust test-python lint bench fixtures extension test-matrix test-window docs pictures clean
+.PHONY: demo test test-rust test-python lint bench fixtures zip extension test-matrix test-window docs pictures clean
 
 demo: $(VENV)/.extension
 	$(PY) tools/with_extension.py demo/demo.py --out $(DEMO_OUT) $(if $(QUICK),--quick) \
@@ -36,7 +36,13 @@ bench: $(VENV)/.extension
 fixtures: $(VENV)/.blender
 	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures
 
-extension: $(VENV)/.extension
+# For this machine, in dist.
+zip: $(VENV)/.extension
+
+# The release: a wheel and a zip for every platform, and the index of a repository. `make test` needs this machine's alone.
+extension: $(VENV)/.blender
+	$(PY) tools/build_core.py --all --out dist/wheels
+	$(PY) tools/build_extension.py --wheels dist/wheels --out dist --index
 
 test-matrix: $(VENV)/.extension
 	$(PY) tools/test_matrix.py
@@ -71,7 +77,7 @@ $(VENV)/.core: $(VENV)/.dev $(CORE_SOURCES)
 	$(PY) -m pip install --quiet --force-reinstall --no-deps dist/wheels/cage_rig_core-*.whl
 	touch $@
 
-$(VENV)/.extension: $(VENV)/.core $(VENV)/.blender $(ADDON_SOURCES) tools/build_extension.py
+$(VENV)/.extension: $(VENV)/.core $(VENV)/.blender $(ADDON_SOURCES) tools/build_extension.py tools/build_core.py
 	$(PY) tools/build_extension.py --wheels dist/wheels --out dist
 	touch $@
 

@@ -1,4 +1,4 @@
-"""Build the core's wheel: abi3, one for Blender 4.2 to 5.2, with an old glibc through zig on Linux."""
+"""Build the core's wheel: abi3, one for Blender 4.2 to 5.2. For this machine, or cross-compiled through zig."""
 
 from __future__ import annotations
 
@@ -6,27 +6,104 @@ import argparse
 import os
 import subprocess
 import sys
+import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 
 
+@dataclass(frozen=True)
+class Platform:
+    """A platform that Blender runs on, by the name it has in Blender's manifests; empty: none of Blender's."""
+
+    blender: str
+    target: str  # Rust's name of it
+    tag: str  # Python's, of the wheel
+    native: str  # how the compiled module in the wheel ends
+
+
+PLATFORMS = (
+    Platform("linux-x64", "x86_64-unknown-linux-gnu", "manylinux_2_28_x86_64", ".abi3.so"),
+    Platform("", "aarch64-unknown-linux-gnu", "manylinux_2_28_aarch64", ".abi3.so"),  # for the package index
+    Platform("windows-x64", "x86_64-pc-windows-gnu", "win_amd64", ".pyd"),
+    Platform("windows-arm64", "aarch64-pc-windows-gnullvm", "win_arm64", ".pyd"),
+    Platform("macos-arm64", "aarch64-apple-darwin", "macosx_11_0_arm64", ".abi3.so"),
+    Platform("macos-x64", "x86_64-apple-darwin", "macosx_10_12_x86_64", ".abi3.so"),
+)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--all", action="store_true", help="for every platform, not only for this machine")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     for old in args.out.glob("cage_rig_core-*.whl"):
         old.unlink()
-    command = [sys.executable, "-m", "maturin", "build", "--release", "--quiet", "--out", str(args.out)]
+    if args.all:
+        targets = [platform.target for platform in PLATFORMS]
+        done = subprocess.run(["rustup", "target", "add", *targets], check=False)
+        if done.returncode:
+            sys.exit("build_core: rustup can't add the targets of the other platforms; see above")
+        for platform in PLATFORMS:
+            build(args.out, ["--target", platform.target, "--zig", *_linux(platform.target)])
+    else:
+        build(args.out, ["--zig", *_linux("linux")] if sys.platform == "linux" else [])
+    for wheel in sorted(args.out.glob("cage_rig_core-*.whl")):
+        check(wheel)
+        print(f"{wheel}  {wheel.stat().st_size / 1e6:.2f} MB")
+
+
+def _linux(target: str) -> list[str]:
+    """An old glibc where the wheel is for Linux."""
+    return ["--compatibility", "manylinux_2_28"] if "linux" in target else []
+
+
+def build(out: Path, arguments: list[str]) -> None:
+    """One wheel, the same bytes every time from the same sources."""
+    command = [
+        sys.executable,
+        "-m",
+        "maturin",
+        "build",
+        "--release",
+        "--locked",
+        "--quiet",
+        "--out",
+        str(out),
+        *arguments,
+    ]
     command += ["--manifest-path", str(ROOT / "rust_core/cage_rig_py/Cargo.toml")]
-    if sys.platform == "linux":
-        command += ["--zig", "--compatibility", "manylinux_2_28"]
     # maturin looks for zig (the ziglang package) through the python3 on PATH
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    subprocess.run(command, check=True, env={**os.environ, "PATH": path})
-    for wheel in args.out.glob("cage_rig_core-*.whl"):
-        print(f"{wheel}  {wheel.stat().st_size / 1e6:.2f} MB")
+    stamp = subprocess.run(["git", "log", "-1", "--format=%ct"], cwd=ROOT, capture_output=True, text=True, check=False)
+    reproducible = {
+        "SOURCE_DATE_EPOCH": stamp.stdout.strip() or "1735689600",
+        "RUSTFLAGS": f"{os.environ.get('RUSTFLAGS', '')} --remap-path-prefix={ROOT}=/cage-rig "
+        f"--remap-path-prefix={Path.home()}=/home".strip(),
+    }
+    subprocess.run(command, check=True, env={**os.environ, **reproducible, "PATH": path})
+
+
+def platform_of(wheel: Path) -> Platform:
+    """The platform that a wheel is for, by its tag."""
+    tag = wheel.stem.split("-", 4)[-1].split(".")[0]
+    for platform in PLATFORMS:
+        if platform.tag == tag:
+            return platform
+    sys.exit(f"build_core: no platform is known for {wheel.name}")
+
+
+def check(wheel: Path) -> None:
+    """Stop where a wheel does not hold its compiled module, stub and licences, or is not for every Python from 3.11."""
+    platform, names = platform_of(wheel), zipfile.ZipFile(wheel).namelist()
+    if "-cp311-abi3-" not in wheel.name:
+        sys.exit(f"build_core: {wheel.name} is not abi3 for Python 3.11 and later")
+    wanted = (f"cage_rig_core{platform.native}", ".pyi", "py.typed", "LICENSE-MIT", "LICENSE-APACHE")
+    missing = [end for end in wanted if not any(name.endswith(end) for name in names)]
+    if missing:
+        sys.exit(f"build_core: {wheel.name} has no {', '.join(missing)}; it has {', '.join(names)}")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import tempfile
 from pathlib import Path
 
@@ -10,12 +11,16 @@ ROOT = Path(__file__).parent.parent
 MODULE = "bl_ext.user_default.cage_rig"
 
 
+SYSTEMS = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}
+MACHINES = {"x86_64": "x64", "AMD64": "x64", "arm64": "arm64", "aarch64": "arm64", "ARM64": "arm64"}
+
+
 def zip_path() -> Path:
-    """The built extension."""
-    found = sorted((ROOT / "dist").glob("cage_rig-*.zip"))
-    if not found:
-        raise FileNotFoundError("no extension in dist/; run 'make extension'")
-    return found[0]
+    """The built extension for this machine."""
+    name = f"cage_rig-{SYSTEMS.get(platform.system())}-{MACHINES.get(platform.machine())}.zip"
+    if not (ROOT / "dist" / name).exists():
+        raise FileNotFoundError(f"no {name} in dist/; run 'make zip'")
+    return ROOT / "dist" / name
 
 
 def isolate() -> None:
