@@ -3,7 +3,7 @@
 
 PYTHON ?= $(shell sh tools/find-python)
 VENV := .venv
-PY := $(VENV)/bin/python
+PY := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)/python
 CORE_SOURCES := $(shell find rust_core -name '*.rs' -o -name '*.toml' -o -name '*.pyi') Cargo.toml Cargo.lock
 ADDON_SOURCES := $(shell find addon -name '*.py' -o -name '*.toml')
 DEMO_OUT ?= build/demo
@@ -25,9 +25,9 @@ test-python: $(VENV)/.extension
 lint: $(VENV)/.core
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
-	$(VENV)/bin/ruff check .
-	$(VENV)/bin/ruff format --check .
-	cd addon && ../$(VENV)/bin/mypy --config-file ../pyproject.toml session.py
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	cd addon && ../$(PY) -m mypy --config-file ../pyproject.toml session.py
 
 bench: $(VENV)/.extension
 	$(PY) tools/with_extension.py tests/bench/bench_blender.py

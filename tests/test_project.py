@@ -1,0 +1,92 @@
+"""What holds of the project as a whole: versions, licences, workflows, and Blender's rules for extensions."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import check_version
+import pytest
+import yaml
+
+ROOT = Path(__file__).parent.parent
+ADDON = sorted((ROOT / "addon").rglob("*.py"))
+WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    assert len(set(check_version.versions().values())) == 1
+    assert check_version.versions("v9.9.9")["tag"] == "9.9.9"
+
+
+def alternatives(expression: str) -> list[set[str]]:
+    """A licence expression as the sets of licences, one of which has to be allowed wholly."""
+    text = expression.replace("/", " OR ")
+    group = re.match(r"\((.*)\) AND (.*)", text)
+    if group:
+        return [found | {group[2]} for found in alternatives(group[1])]
+    return [set(part.split(" AND ")) for part in text.split(" OR ")]
+
+
+def test_every_crate_has_a_licence_that_is_allowed() -> None:
+    allowed = set(tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]["allow"])
+    command = ["cargo", "metadata", "--format-version", "1", "--locked"]
+    found = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout)["packages"]
+    assert len(found) > 50
+    for package in found:
+        assert package["license"], package["name"]
+        assert any(part <= allowed for part in alternatives(package["license"])), (package["name"], package["license"])
+    assert not any("AGPL" in package["license"] for package in found)
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_workflows_call_what_is_there(path: Path) -> None:
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    text = path.read_text()
+    jobs = yaml.safe_load(text)["jobs"]
+    called = set(re.findall(r"\bmake ([a-z-]+)", text))
+    assert jobs and called and called <= targets
+    for script in re.findall(r"python (tools/\S+)", text):
+        assert (ROOT / script).exists(), script
+    for job in jobs.values():
+        assert set(job.get("needs", "").split()) <= set(jobs)
+
+
+@pytest.mark.parametrize("path", ADDON, ids=lambda path: str(path.relative_to(ROOT)))
+def test_the_add_on_keeps_to_the_rules_for_extensions(path: Path) -> None:
+    """Relative imports, no threads of Python's, no network, no code from text, no change of the search path."""
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.level == 0:
+            names = [node.module or ""]
+        for name in names:
+            assert name.split(".")[0] not in FORBIDDEN, f"{name} at line {node.lineno}"
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            assert node.func.id not in {"eval", "exec", "compile", "__import__"}, f"line {node.lineno}"
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            assert (node.value.id, node.attr) not in {("sys", "path"), ("os", "system")}, f"line {node.lineno}"
+
+
+FORBIDDEN = {
+    "threading",
+    "concurrent",
+    "multiprocessing",
+    "asyncio",
+    "socket",
+    "urllib",
+    "http",
+    "requests",
+    "subprocess",
+}
+FORBIDDEN |= {"addon", "cage_rig", "ctypes", "pip"}
+
+
+def test_the_manifest_asks_for_files_only() -> None:
+    manifest = tomllib.loads((ROOT / "addon/blender_manifest.toml").read_text())
+    assert set(manifest["permissions"]) == {"files"}, "nothing of it is online"
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"] and len(manifest["tagline"]) <= 64
