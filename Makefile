@@ -33,14 +33,16 @@ bench: $(VENV)/.extension
 	$(PY) tools/with_extension.py tests/bench/bench_blender.py
 	cargo bench --quiet -p cage_rig --bench skinning --bench binding
 
-fixtures: $(VENV)/.blender
+fixtures: $(VENV)/.extension
 	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures
+	$(PY) tools/build_samples.py
 
 # For this machine, in dist.
 zip: $(VENV)/.extension
 
 # The release: a wheel and a zip for every platform, and the index of a repository. `make test` needs this machine's alone.
-extension: $(VENV)/.blender
+extension: $(VENV)/.extension
+	$(PY) tools/build_samples.py
 	$(PY) tools/build_core.py --all --out dist/wheels
 	$(PY) tools/build_extension.py --wheels dist/wheels --out dist --index
 

@@ -16,12 +16,13 @@ import bpy
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from blend_fixtures import build, corrections, rigs, small
+from blend_fixtures import build, corrections, octopus, rigs, small
 
 FIXTURES: dict[str, Callable[[], build.RigObjects]] = {
     "biped": build.build_biped,
     "bar": build.build_bar,
     "arm": build.build_arm,
+    "octopus": lambda: build.build_character(octopus.octopus()),
     "simple_bar": lambda: build.build_character(small.simple_bar()),
     "two_skins": lambda: build.build_character(small.two_skins()),
     "two_roots": lambda: build.build_character(small.two_roots()),

@@ -50,13 +50,14 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"bpy", "mathutils", "numpy", "pathlib"},
         {"adapters", "bake", "exchange", "lifecycle", "session"},
     ),
+    "samples": ({"bpy", "mathutils", "pathlib"}, {"registry"}),
     "keying": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "sync"}),
     "repair": ({"bpy"}, {"adapters", "lifecycle"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "handlers": ({"bpy"}, {"sync"}),
     "operators": (
         {"bpy"},
-        {"bake", "choosing", "exchange", "keying", "lifecycle", "operators", "props", "repair", "selection"},
+        {"bake", "choosing", "exchange", "keying", "lifecycle", "operators", "props", "repair", "samples", "selection"},
     ),
     "ui": ({"bpy"}, {"choosing", "keying", "props", "repair", "ui"}),
     "ui/overlays": (

@@ -14,6 +14,7 @@ from pathlib import Path
 from build_core import platform_of
 
 ROOT = Path(__file__).parent.parent
+SAMPLES = ROOT / "build/samples"  # by build_samples; made in the oldest Blender, so that all can open them
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "wheels")
 
 
@@ -35,6 +36,8 @@ def stage(wheel: Path, platform: str, folder: Path) -> None:
     (folder / "wheels").mkdir()
     shutil.copy(wheel, folder / "wheels")
     shutil.copy(ROOT / "LICENSE", folder)
+    if SAMPLES.exists():
+        shutil.copytree(SAMPLES, folder / "sample_files", ignore=shutil.ignore_patterns("*.blend1"))
     manifest = folder / "blender_manifest.toml"
     # before the first table, where every key still is the manifest's own
     manifest.write_text(f'platforms = ["{platform}"]\nwheels = ["./wheels/{wheel.name}"]\n' + manifest.read_text())

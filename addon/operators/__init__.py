@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import bpy
 
+from .. import samples
 from . import waiting
+from .add_sample import CAGE_RIG_MT_samples, CAGE_RIG_OT_add_sample
 from .apply_refit import CAGE_RIG_OT_apply_refit
 from .bake import CAGE_RIG_OT_bake
 from .bind import CAGE_RIG_OT_bind
@@ -43,7 +45,14 @@ CLASSES = (
     CAGE_RIG_OT_load_coordinates,
     CAGE_RIG_OT_drop_coordinates,
     CAGE_RIG_OT_export_coordinates,
+    CAGE_RIG_OT_add_sample,
+    CAGE_RIG_MT_samples,
 )
+
+
+def _add_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
+    if context.mode == "OBJECT" and samples.names():
+        self.layout.menu(CAGE_RIG_MT_samples.bl_idname, icon="ARMATURE_DATA")
 
 
 def _object_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -60,6 +69,7 @@ def _export_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 MENUS = (
+    (bpy.types.VIEW3D_MT_add, _add_menu),
     (bpy.types.VIEW3D_MT_object, _object_menu),
     (bpy.types.TOPBAR_MT_file_import, _import_menu),
     (bpy.types.TOPBAR_MT_file_export, _export_menu),

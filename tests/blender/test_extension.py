@@ -16,8 +16,9 @@ def test_the_zip_holds_the_add_on_its_wheel_and_its_licence() -> None:
     assert manifest["id"] == "cage_rig" and manifest["blender_version_min"] == "4.2.0"
     assert [name for name in names if name.endswith(".whl")] == [w.removeprefix("./") for w in manifest["wheels"]]
     assert "abi3" in manifest["wheels"][0]
+    assert all(name.startswith("sample_files/") for name in names if name.endswith(".blend"))
     assert "LICENSE" in names and "__init__.py" in names
-    assert not [name for name in names if "__pycache__" in name or name.endswith((".blend", ".md"))]
+    assert not [name for name in names if "__pycache__" in name or name.endswith((".blend1", ".md"))]
 
 
 def test_the_core_comes_from_the_installed_wheel() -> None:
