@@ -179,23 +179,23 @@ def _draw_settings(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
     column = layout.column()
     column.use_property_split = True
     column.use_property_decorate = False
-    column.prop(settings, "method")
-    _draw_choice(column, cage)
+    _draw_method(column, cage)
     row = column.row(align=True)
     row.use_property_decorate = True
     row.prop(settings, "influence", slider=True)
 
 
-def _draw_choice(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
-    """The method that is being prepared, and what the rig does meanwhile."""
+def _draw_method(layout: bpy.types.UILayout, cage: bpy.types.Object) -> None:
+    """The method; in its place, while it is being prepared, how far that is. The rows below stay where they are."""
     found = choosing.progress(cage)
     if found is None:
+        layout.prop(cage.cage_rig, "method")
         return
     share, before = found
     label = next(label for name, label, *_ in METHODS if name == before)
-    layout.progress(factor=share, text=f"Computing, {share:.0%}")
-    layout.label(text=f"The skin follows {label} until then")
-    layout.operator("cage_rig.cancel_method", icon="X")
+    row = layout.row(align=True)
+    row.progress(factor=share, text=f"Computing, {share:.0%}; still {label}")
+    row.operator("cage_rig.cancel_method", text="", icon="X")
 
 
 def _draw_part(layout: bpy.types.UILayout, obj: bpy.types.Object | None, label: str, icon: str) -> None:
