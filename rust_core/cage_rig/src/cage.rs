@@ -6,7 +6,7 @@
 
 use crate::error::CageError;
 use crate::mesh::{triangulate, FaceFault, Piece, Polygons};
-use crate::points::{bounding_diagonal, first_not_finite, Point};
+use crate::points::{bounding_diagonal, first_unusable, Point};
 use std::collections::HashMap;
 
 /// A closed, manifold triangle mesh with faces outward. Several closed parts are allowed.
@@ -61,7 +61,7 @@ fn check_vertices(vertices: &[Point], faces: &Polygons) -> Result<(), CageError>
     if vertices.len() < 4 || faces.len() < 4 {
         return Err(CageError::TooSmall { vertices: vertices.len(), faces: faces.len() });
     }
-    if let Some(vertex) = first_not_finite(vertices) {
+    if let Some(vertex) = first_unusable(vertices) {
         return Err(CageError::NotFinite { vertex });
     }
     let mut places = HashMap::with_capacity(vertices.len());

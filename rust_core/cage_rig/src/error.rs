@@ -49,13 +49,19 @@ pub enum Error {
         /// How many there are.
         found: usize,
     },
-    /// A number is NaN or infinite.
-    #[error("{argument} has a value that is not finite in row {row}")]
+    /// A number is NaN, infinite, or beyond [`crate::LARGEST`].
+    #[error("{argument} has a value that is not finite or beyond 1e12 in row {row}")]
     NotFinite {
         /// The argument's name.
         argument: &'static str,
         /// The first such row.
         row: usize,
+    },
+    /// A matrix moves nothing.
+    #[error("{argument} is zero everywhere, so the cage would move nothing")]
+    AllZero {
+        /// The argument's name.
+        argument: &'static str,
     },
     /// An option is out of its range.
     #[error("option {option} must be {expected}, found {found}")]
@@ -81,7 +87,7 @@ pub enum CageError {
     BadIndex { face: usize, vertex: i64, vertices: usize },
     #[error("cage face {face} uses vertex {vertex} twice")]
     RepeatedCorner { face: usize, vertex: usize },
-    #[error("cage vertex {vertex} has a coordinate that is not finite")]
+    #[error("cage vertex {vertex} has a coordinate that is not finite or beyond 1e12")]
     NotFinite { vertex: usize },
     #[error("cage vertex {vertex} belongs to no face")]
     UnusedVertex { vertex: usize },
@@ -119,7 +125,7 @@ pub enum SkinError {
     BadIndex { face: usize, vertex: i64, vertices: usize },
     #[error("the offsets of the rest skin have {found} rows; the skin has {expected} vertices")]
     OffsetCount { expected: usize, found: usize },
-    #[error("row {row} of the offsets of the rest skin is not finite")]
+    #[error("row {row} of the offsets of the rest skin is not finite or beyond 1e12")]
     OffsetNotFinite { row: usize },
     #[error("the cage encloses no vertex of the skin; the cage and the skin must be at the same place")]
     OutOfReach,
@@ -139,7 +145,7 @@ pub enum SkinError {
 pub enum WeightsError {
     #[error("the weight of vertex {vertex} for joint {joint} is negative ({weight})")]
     Negative { vertex: usize, joint: usize, weight: f64 },
-    #[error("the weight of vertex {vertex} for joint {joint} is not a finite number")]
+    #[error("the weight of vertex {vertex} for joint {joint} is not a finite number up to 1e12")]
     NotFinite { vertex: usize, joint: usize },
     #[error("vertex {vertex} has a weight for joint {joint}, but there are {joints} joints")]
     BadJoint { vertex: usize, joint: i64, joints: usize },
@@ -165,7 +171,7 @@ pub enum SkeletonError {
     BadParent { joint: usize, parent: i64, joints: usize },
     #[error("joint {joint} is its own ancestor")]
     Cycle { joint: usize },
-    #[error("joint {joint} has a coordinate that is not finite")]
+    #[error("joint {joint} has a coordinate that is not finite or beyond 1e12")]
     NotFinite { joint: usize },
 }
 
@@ -175,17 +181,17 @@ pub enum SkeletonError {
 pub enum PoseError {
     #[error("there are {found} transforms; the skeleton has {expected} joints")]
     TransformCount { expected: usize, found: usize },
-    #[error("the transform of joint {joint} has a value that is not finite")]
+    #[error("the transform of joint {joint} has a value that is not finite or beyond 1e12")]
     TransformNotFinite { joint: usize },
     #[error("the transform of joint {joint} is not affine: its last row must be 0 0 0 1")]
     NotAffine { joint: usize },
     #[error("there are {found} rest joints; the skeleton has {expected} joints")]
     JointCount { expected: usize, found: usize },
-    #[error("rest joint {joint} has a coordinate that is not finite")]
+    #[error("rest joint {joint} has a coordinate that is not finite or beyond 1e12")]
     JointNotFinite { joint: usize },
     #[error("the edited cage has {found} vertices; the bound one has {expected}")]
     CageCount { expected: usize, found: usize },
-    #[error("vertex {vertex} of the edited cage has a coordinate that is not finite")]
+    #[error("vertex {vertex} of the edited cage has a coordinate that is not finite or beyond 1e12")]
     CageNotFinite { vertex: usize },
     #[error("in this pose the posed cage cannot be edited: a bone is squashed flat, so no rest cage gives the wanted one (pivot ratio {pivot_ratio:.1e})")]
     Singular { pivot_ratio: f64 },

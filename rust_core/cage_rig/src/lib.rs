@@ -36,7 +36,7 @@ pub(crate) mod fixtures;
 pub use cage::Cage;
 pub use error::{CageError, Error, PoseError, SkeletonError, SkinError, WeightsError};
 pub use mesh::Polygons;
-pub use points::{bounding_diagonal, Matrix3, Point, Transform};
+pub use points::{bounding_diagonal, Matrix3, Point, Transform, LARGEST};
 pub use progress::{unwatched, Cancelled, Part, Progress};
 pub use rows::Rows;
 pub use skeleton::Skeleton;

@@ -25,15 +25,23 @@ impl Transform {
         self.linear * point + self.translation
     }
 
-    /// True when every entry is finite.
-    pub fn is_finite(&self) -> bool {
-        self.linear.iter().chain(self.translation.iter()).all(|x| x.is_finite())
+    /// True when every entry is finite and at most [`LARGEST`].
+    pub fn is_usable(&self) -> bool {
+        self.linear.iter().chain(self.translation.iter()).all(is_usable)
     }
 }
 
-/// The index of the first point with a coordinate that is not finite.
-pub(crate) fn first_not_finite(points: &[Point]) -> Option<usize> {
-    points.iter().position(|p| !p.iter().all(|x| x.is_finite()))
+/// Beyond this, products of coordinates leave single precision, and of differences nothing is left.
+pub const LARGEST: f64 = 1e12;
+
+/// Whether a coordinate is finite and not so large that what is computed from it would not be.
+pub(crate) fn is_usable(x: &f64) -> bool {
+    x.abs() <= LARGEST
+}
+
+/// The index of the first point with a coordinate that is not usable.
+pub(crate) fn first_unusable(points: &[Point]) -> Option<usize> {
+    points.iter().position(|p| !p.iter().all(is_usable))
 }
 
 /// The diagonal of the bounding box of `points`: the *size* that every tolerance is relative to.

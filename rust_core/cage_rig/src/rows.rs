@@ -1,6 +1,6 @@
 //! [`Rows`]: a dense matrix stored row by row, the shape in which coordinates are made and read.
 
-use crate::points::Point;
+use crate::points::{is_usable, Point};
 use rayon::prelude::*;
 
 /// A dense `f64` matrix in row-major order. One row per moved point, one column per mover.
@@ -77,8 +77,8 @@ impl Rows {
         (0..self.len()).into_par_iter().with_min_len(256).map(|i| self.combine(i, points)).collect()
     }
 
-    /// The first row with a number that is not finite.
-    pub(crate) fn first_not_finite(&self) -> Option<usize> {
-        (0..self.len()).find(|&i| !self.row(i).iter().all(|x| x.is_finite()))
+    /// The first row with a number that is not usable.
+    pub(crate) fn first_unusable(&self) -> Option<usize> {
+        (0..self.len()).find(|&i| !self.row(i).iter().all(is_usable))
     }
 }

@@ -1,7 +1,7 @@
 //! The skeleton: joints at rest and who hangs on whom.
 
 use crate::error::SkeletonError;
-use crate::points::{first_not_finite, Point};
+use crate::points::{first_unusable, Point};
 
 /// Joints (`#J by 3`, rig space) and their hierarchy. Parents may come in any order.
 #[derive(Debug, Clone)]
@@ -22,7 +22,7 @@ impl Skeleton {
         if parents.len() != count {
             return Err(SkeletonError::ParentCount { joints: count, parents: parents.len() });
         }
-        if let Some(joint) = first_not_finite(&joints) {
+        if let Some(joint) = first_unusable(&joints) {
             return Err(SkeletonError::NotFinite { joint });
         }
         let checked: Vec<Option<usize>> = parents

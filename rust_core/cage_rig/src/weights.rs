@@ -1,6 +1,7 @@
 //! Skin weights Ω: which joints move which vertex, and how much.
 
 use crate::error::WeightsError;
+use crate::points::is_usable;
 use crate::rows::Rows;
 
 /// Ω, `#M by #J`, one sparse row per vertex. Every row sums to 1, or is empty: such a vertex is
@@ -69,7 +70,7 @@ impl SkinWeights {
             let Some(index) = usize::try_from(joint).ok().filter(|&j| j < self.joints) else {
                 return Err(WeightsError::BadJoint { vertex, joint, joints: self.joints });
             };
-            if !weight.is_finite() {
+            if !is_usable(&weight) {
                 return Err(WeightsError::NotFinite { vertex, joint: index });
             }
             if weight < 0.0 {

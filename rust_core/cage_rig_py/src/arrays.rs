@@ -83,12 +83,14 @@ fn floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Bl
 
 fn finite_floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Block<f64>> {
     let block = floats(value, argument, shape)?;
-    match block.data.iter().position(|x| !x.is_finite()) {
+    match block.data.iter().position(|x| !(x.abs() <= cage_rig::LARGEST)) {
         None => Ok(block),
         Some(at) => {
             let width: usize = block.shape[1..].iter().product();
             let row = at / width;
-            Err(ArrayError::new_err(format!("{argument} has a value that is not finite in row {row}")))
+            Err(ArrayError::new_err(format!(
+                "{argument} has a value that is not finite or beyond 1e12 in row {row}"
+            )))
         }
     }
 }

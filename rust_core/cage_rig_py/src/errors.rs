@@ -36,7 +36,7 @@ pub(crate) fn raise(error: impl Into<Error>) -> PyErr {
         Error::Skeleton(_) => SkeletonError::new_err(message),
         Error::Pose(_) => PoseError::new_err(message),
         Error::Cancelled(_) => Cancelled::new_err(message),
-        Error::Size { .. } | Error::NotFinite { .. } => ArrayError::new_err(message),
+        Error::Size { .. } | Error::NotFinite { .. } | Error::AllZero { .. } => ArrayError::new_err(message),
         Error::UnknownName { .. } | Error::Option { .. } => CageRigError::new_err(message),
     }
 }

@@ -15,7 +15,7 @@ use crate::cage::Cage;
 use crate::coordinates::CoordinateKind;
 use crate::error::{Error, SkinError, WeightsError};
 use crate::mesh::{triangulate, FaceFault, Polygons};
-use crate::points::{bounding_diagonal, first_not_finite, Point};
+use crate::points::{bounding_diagonal, first_unusable, Point};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use crate::skeleton::Skeleton;
@@ -148,6 +148,9 @@ impl Binding {
 
         stages.coordinates.begin("cage coordinates")?;
         let cage_coords = match checked(known.cage_coords, "cage_coords", rows, columns)? {
+            Some(coords) if (0..rows).all(|i| coords.row(i).iter().all(|x| *x == 0.0)) => {
+                return Err(Error::AllZero { argument: "cage_coords" })
+            }
             Some(coords) => coords,
             None => (input.coordinates.compute)(&cage, &skin, &stages.coordinates)?,
         };
@@ -275,7 +278,7 @@ fn check_skin(input: &BindInput) -> Result<Vec<[u32; 3]>, Error> {
     if vertices == 0 {
         return Err(SkinError::Empty.into());
     }
-    if let Some(row) = first_not_finite(&input.skin_vertices) {
+    if let Some(row) = first_unusable(&input.skin_vertices) {
         return Err(Error::NotFinite { argument: "skin_vertices", row });
     }
     if input.skin_weights.len() != vertices {
@@ -305,7 +308,7 @@ fn checked(
     if given.len() != rows {
         return Err(Error::Size { argument, unit: "rows", expected: rows, found: given.len() });
     }
-    match given.first_not_finite() {
+    match given.first_unusable() {
         Some(row) => Err(Error::NotFinite { argument, row }),
         None => Ok(Some(given)),
     }

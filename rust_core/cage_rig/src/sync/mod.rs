@@ -37,7 +37,7 @@ pub use work::Work;
 
 use crate::cage::Cage;
 use crate::error::{CageError, Error, PoseError, SkinError};
-use crate::points::{bounding_diagonal, first_not_finite, Matrix3, Point, Transform};
+use crate::points::{bounding_diagonal, first_unusable, Matrix3, Point, Transform};
 use crate::progress::{unwatched, Cancelled, Part, Progress};
 use crate::rows::Rows;
 use crate::skinning::{SkinningInput, SkinningMethod};
@@ -177,7 +177,7 @@ impl CoupledRig {
             if offsets.len() != self.rest_skin.len() {
                 return Err(SkinError::OffsetCount { expected: self.rest_skin.len(), found: offsets.len() });
             }
-            if let Some(row) = first_not_finite(offsets) {
+            if let Some(row) = first_unusable(offsets) {
                 return Err(SkinError::OffsetNotFinite { row });
             }
         }
@@ -331,14 +331,14 @@ impl CoupledRig {
         if cage.len() != self.rest_cage.len() {
             return Err(PoseError::CageCount { expected: self.rest_cage.len(), found: cage.len() });
         }
-        first_not_finite(cage).map_or(Ok(()), |vertex| Err(PoseError::CageNotFinite { vertex }))
+        first_unusable(cage).map_or(Ok(()), |vertex| Err(PoseError::CageNotFinite { vertex }))
     }
 
     fn check_joints(&self, joints: &[Point]) -> Result<(), PoseError> {
         if joints.len() != self.joints.len() {
             return Err(PoseError::JointCount { expected: self.joints.len(), found: joints.len() });
         }
-        first_not_finite(joints).map_or(Ok(()), |joint| Err(PoseError::JointNotFinite { joint }))
+        first_unusable(joints).map_or(Ok(()), |joint| Err(PoseError::JointNotFinite { joint }))
     }
 
     fn read_motions(
@@ -351,7 +351,7 @@ impl CoupledRig {
         if transforms.len() != skeleton.len() {
             return Err(PoseError::TransformCount { expected: skeleton.len(), found: transforms.len() });
         }
-        if let Some(joint) = transforms.iter().position(|t| !t.is_finite()) {
+        if let Some(joint) = transforms.iter().position(|t| !t.is_usable()) {
             return Err(PoseError::TransformNotFinite { joint });
         }
         self.check_joints(rest_joints)?;
