@@ -1,4 +1,4 @@
-# make demo · test · lint · bench · fixtures · zip · extension · test-matrix · docs · pictures
+# make demo · test · lint · bench · fixtures · zip · extension · test-matrix · soak · docs · pictures
 # Every target sets up what it needs in .venv; nothing but Python, a Rust toolchain and make is assumed.
 
 PYTHON ?= $(shell sh tools/find-python)
@@ -8,7 +8,7 @@ CORE_SOURCES := $(shell find rust_core -name '*.rs' -o -name '*.toml' -o -name '
 ADDON_SOURCES := $(shell find addon -name '*.py' -o -name '*.toml')
 DEMO_OUT ?= build/demo
 
-.PHONY: demo test test-rust test-python lint bench fixtures zip extension test-matrix test-window docs pictures clean
+.PHONY: demo test test-rust test-python lint bench fixtures zip extension test-matrix test-window soak docs pictures clean
 
 demo: $(VENV)/.extension
 	$(PY) tools/with_extension.py demo/demo.py --out $(DEMO_OUT) $(if $(QUICK),--quick) \
@@ -48,6 +48,9 @@ extension: $(VENV)/.extension
 
 test-matrix: $(VENV)/.extension
 	$(PY) tools/test_matrix.py
+
+soak: $(VENV)/.extension
+	$(PY) tools/with_extension.py tests/blender/soak.py 10000
 
 test-window: $(VENV)/.extension
 	$(PY) tests/window/run.py

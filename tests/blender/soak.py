@@ -1,0 +1,236 @@
+"""A soak: random events on three rigs in one scene, which at any time equal a bind computed anew, in constant memory.
+
+`make soak` runs ten thousand; `test_soak` a few hundred. As a script: soak.py EVENTS [SEED]
+"""
+
+from __future__ import annotations
+
+import random
+import resource
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+from scene import Rig, bind, drag, enter_edit_mode, fresh, leave_edit_mode, rest, select, set_mesh, shown, update
+
+from blend_fixtures.build import build_character
+from blend_fixtures.rigs import build_rig
+from blend_fixtures.small import simple_bar, two_skins
+
+TOLERANCE = 2e-5  # of what is shown from a fresh bind, relative to the size
+EVERY = 25  # events between two comparisons
+GROWTH = 64e6  # bytes that the process may grow by, once every kind of event has been met
+
+
+class Soak:
+    """The scene, the events, and what has to hold."""
+
+    def __init__(self, seed: int, folder: Path) -> None:
+        self.chance = random.Random(seed)
+        self.path = folder / "soak.blend"
+        self.met: dict[str, int] = {}
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        bpy.context.preferences.edit.undo_steps = 12
+        self.names: list[tuple[list[str], str, str]] = []
+        for build in (
+            lambda: build_character(replace(simple_bar(), shape_keys={})),
+            lambda: build_character(two_skins()),
+            lambda: build_rig("keyed_locations"),
+        ):
+            rig = bind(build())
+            for points in (rig.cage, rig.armature, *rig.skins):
+                points.name = f"{len(self.names)} {points.name}"
+            self.names.append(([skin.name for skin in rig.skins], rig.armature.name, rig.cage.name))
+        bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 25
+        self.push()
+
+    def rig(self, index: int) -> Rig:
+        """A rig by its names: undo and load make all objects anew."""
+        skins, armature, cage = self.names[index]
+        objects = bpy.data.objects
+        return Rig([objects[name] for name in skins], objects[armature], objects[cage])
+
+    def push(self) -> None:
+        bpy.ops.ed.undo_push(message="soak")
+
+    def run(self, events: int) -> list[str]:
+        """Let so many events happen; returns what was found wrong."""
+        faults: list[str] = []
+        names = list(EVENTS)
+        memory = 0
+        for count in range(1, events + 1):
+            name = self.chance.choice(names)
+            self.met[name] = self.met.get(name, 0) + 1
+            EVENTS[name](self, self.rig(self.chance.randrange(len(self.names))))
+            update()
+            if count % EVERY == 0 or count == events:
+                faults += [f"after event {count} ({name}): {fault}" for fault in self.compare()]
+            if count == events * 2 // 5:
+                memory = resident()
+        grown = resident() - memory
+        if grown > GROWTH:
+            faults.append(f"the process grew by {grown / 1e6:.0f} MB")
+        return faults
+
+    def compare(self) -> list[str]:
+        """Every rig against a bind computed anew from the same file."""
+        faults = []
+        for index in range(len(self.names)):
+            rig = self.rig(index)
+            if rig.settings.state != "LIVE":
+                faults.append(f"{rig.cage.name} is {rig.settings.state}: {rig.settings.message}")
+                continue
+            live = [shown(skin).copy() for skin in rig.skins]
+            for skin, found, wanted in zip(rig.skins, live, fresh(rig), strict=True):
+                error = float(np.abs(found - wanted).max()) / rig.size
+                if not error <= TOLERANCE:
+                    faults.append(f"{skin.name} is off by {error:.1e} of its size")
+        return faults
+
+
+def resident() -> int:
+    """Bytes of memory that the process has now."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    except OSError:  # not Linux: the most it ever had
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def _rest_cage(soak: Soak, rig: Rig) -> None:
+    keys = rig.cage.data.shape_keys
+    points = (rig.cage.data.vertices if keys is None else keys.reference_key.data)[:]
+    soak.chance.choice(points).co.z += soak.chance.uniform(-0.05, 0.05)
+    rig.cage.data.update()
+    update()
+    soak.push()
+
+
+def _posed_cage(soak: Soak, rig: Rig) -> None:
+    points = rest(rig.posed)
+    points[soak.chance.randrange(len(points))] += [soak.chance.uniform(-0.05, 0.05) for _ in range(3)]
+    set_mesh(rig.posed, points)
+    soak.push()
+
+
+def _pose(soak: Soak, rig: Rig) -> None:
+    bone = soak.chance.choice(list(rig.armature.pose.bones))
+    bone.rotation_mode = "XYZ"
+    bone.rotation_euler = [soak.chance.uniform(-0.8, 0.8) for _ in range(3)]
+    soak.push()
+
+
+def _frame(soak: Soak, _rig: Rig) -> None:
+    bpy.context.scene.frame_set(soak.chance.randint(1, 25))
+
+
+def _undo(soak: Soak, _rig: Rig) -> None:
+    if bpy.ops.ed.undo.poll():
+        bpy.ops.ed.undo()
+        if soak.names[-1][2] not in bpy.data.objects:  # from before the characters were there
+            bpy.ops.ed.redo()
+
+
+def _redo(_soak: Soak, _rig: Rig) -> None:
+    if bpy.ops.ed.redo.poll():
+        bpy.ops.ed.redo()
+
+
+def _save_and_load(soak: Soak, _rig: Rig) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(soak.path))
+    bpy.ops.wm.open_mainfile(filepath=str(soak.path))
+    soak.push()
+
+
+def _delete_and_undo(soak: Soak, rig: Rig) -> None:
+    soak.push()
+    victim = soak.chance.choice([rig.posed, rig.cage, rig.armature, rig.refit, *rig.skins])
+    bpy.data.objects.remove(victim)
+    update()
+    soak.push()
+    bpy.ops.ed.undo()
+    soak.push()  # or a redo would delete it again
+
+
+def _edit_mode(soak: Soak, rig: Rig) -> None:
+    obj = soak.chance.choice([rig.posed, rig.cage])
+    enter_edit_mode(obj)
+    for _ in range(3):
+        drag(obj, soak.chance.randrange(len(obj.data.vertices)), (soak.chance.uniform(-0.05, 0.05), 0.0, 0.02))
+    leave_edit_mode()
+    soak.push()
+
+
+def _setting(soak: Soak, rig: Rig) -> None:
+    rig.settings.method = soak.chance.choice(("LBS", "DQS", "COR"))
+    rig.settings.influence = soak.chance.choice((1.0, 1.0, 0.7))
+    update()
+    soak.push()
+
+
+def _key(soak: Soak, rig: Rig) -> None:
+    select([rig.cage], rig.cage)
+    name = soak.chance.choice(("key_cage", "key_envelope", "delete_key", "discard_edit"))
+    if getattr(bpy.ops.cage_rig, name).poll():
+        getattr(bpy.ops.cage_rig, name)()
+    update()
+    soak.push()
+
+
+def _rebind(soak: Soak, rig: Rig) -> None:
+    select([rig.cage], rig.cage)
+    bpy.ops.cage_rig.rebind()
+    soak.push()
+
+
+def _copy_and_delete(soak: Soak, rig: Rig) -> None:
+    select([*rig.skins, rig.armature, rig.cage, rig.posed, rig.refit], rig.cage)
+    bpy.ops.object.duplicate()
+    update()
+    bpy.ops.object.delete()
+    update()
+    bpy.data.orphans_purge()
+    soak.push()
+
+
+def _envelope(soak: Soak, rig: Rig) -> None:
+    """Back to the cage as it was bound, so that shapes do not wander off over thousands of events."""
+    select([rig.cage], rig.cage)
+    bpy.ops.cage_rig.key_envelope()
+    soak.push()
+
+
+EVENTS: dict[str, Callable[[Soak, Rig], None]] = {
+    "rest cage": _rest_cage,
+    "posed cage": _posed_cage,
+    "pose": _pose,
+    "frame": _frame,
+    "undo": _undo,
+    "redo": _redo,
+    "save and load": _save_and_load,
+    "delete and undo": _delete_and_undo,
+    "edit mode": _edit_mode,
+    "setting": _setting,
+    "key": _key,
+    "rebind": _rebind,
+    "copy and delete": _copy_and_delete,
+    "envelope": _envelope,
+}
+
+
+def main() -> None:
+    events, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    with tempfile.TemporaryDirectory() as folder:
+        soak = Soak(seed, Path(folder))
+        faults = soak.run(events)
+    for fault in faults[:20]:
+        print(fault)
+    print(f"{events} events, {len(faults)} faults, {resident() / 1e6:.0f} MB: {soak.met}")
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()
