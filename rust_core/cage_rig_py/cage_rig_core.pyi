@@ -5,7 +5,8 @@ are in rig space. Shapes are written (rows, columns): #M skin vertices, #C cage 
 #J joints. Rows are what is moved, columns what moves it.
 """
 
-from typing import Any, TypeAlias, TypedDict, final
+from collections.abc import Callable
+from typing import Any, Literal, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ __all__ = [
     "CageError",
     "CageRigError",
     "Cancelled",
+    "CagingError",
     "CoupledRig",
     "MethodJob",
     "PanicException",
@@ -30,8 +32,10 @@ __all__ = [
     "SkinError",
     "WeightsError",
     "__version__",
+    "cage_sections",
     "check_cage",
     "coordinate_kinds",
+    "generate_cage",
     "mean_value_coordinates",
     "skinning_methods",
 ]
@@ -48,6 +52,13 @@ class ArrayError(CageRigError): ...
 
 class Cancelled(Exception):
     """A job was cancelled; nothing of it is left."""
+
+class CagingError(CageRigError):
+    """No cage was generated; says where the fault is, as far as it has a place."""
+
+    node: int | None  # of the skeleton
+    place: tuple[float, float, float] | None
+    cancelled: bool
 
 class PanicException(BaseException):
     """A bug in the core stopped a call; the rig that raised it refuses further calls."""
@@ -228,3 +239,64 @@ def mean_value_coordinates(points: ArrayLike, cage_vertices: ArrayLike, cage_fac
 def check_cage(cage_vertices: ArrayLike, cage_faces: Faces) -> CageCheck: ...
 def skinning_methods() -> list[str]: ...
 def coordinate_kinds() -> list[str]: ...
+
+class CagingOptions(TypedDict, total=False):
+    placement: Literal["automatic", "joints"]  # of bending nodes where none are given
+    grid: int  # cells a side of the window in which a section's field is solved
+    corners: int  # of a section
+    reach: float  # gaps narrower than this push; relative to the skin's diagonal, as the next
+    clearance: float  # no gap ends narrower
+    tightness: float
+    rounds: int  # of tightening
+    triangles: bool  # instead of quads
+    asymmetric: bool  # leave a symmetric character's cage as it comes
+
+class Section(TypedDict):
+    kind: Literal["bending", "leaf"]
+    point: Doubles  # (3,)
+    direction: Doubles  # (3,)
+    radius: float
+    node: int  # the nearest node of the skeleton
+    arc: int  # sections of one arc are joined in order
+    ring: Doubles  # (n, 3)
+    corners: Doubles  # (corners, 3)
+
+class Repairs(TypedDict):
+    welded: int
+    left_out: int
+    turned: int
+    inside_out: bool
+    parts: int
+
+class CagingReport(TypedDict):
+    sections: list[Section]
+    vertex_sections: NDArray[np.int64]  # (#C,)
+    dropped_nodes: list[int]
+    repairs: Repairs
+    volume_ratio: float
+    mean_distance: float  # relative to the skin's diagonal, as the next
+    clearance: float
+    min_angle: float  # degrees
+    genus: int
+    mirror: NDArray[np.int64] | None  # (#C,): each vertex's image in x
+    timings: dict[str, float]  # seconds
+
+def generate_cage(
+    vertices: ArrayLike,  # (#V, 3)
+    faces: Faces,  # closed
+    nodes: ArrayLike,  # (#N, 3), of the skeleton
+    edges: ArrayLike,  # (#E, 2)
+    *,
+    bending_nodes: ArrayLike | None = None,  # (#B, 3), near the skeleton
+    options: CagingOptions | None = None,
+    progress: Callable[[str, float], object] | None = None,  # stage, part; a false answer but None cancels
+) -> tuple[Doubles, NDArray[np.int64] | tuple[NDArray[np.int64], NDArray[np.int64]], CagingReport]: ...
+def cage_sections(
+    vertices: ArrayLike,
+    faces: Faces,
+    nodes: ArrayLike,
+    edges: ArrayLike,
+    *,
+    bending_nodes: ArrayLike | None = None,
+    options: CagingOptions | None = None,
+) -> list[Section]: ...

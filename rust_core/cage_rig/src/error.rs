@@ -4,6 +4,7 @@
 //! where input enters; an edit that returns one has changed nothing.
 
 use crate::progress::Cancelled;
+use crate::points::Point;
 use thiserror::Error;
 
 /// Anything that can be wrong with what was handed in.
@@ -27,6 +28,9 @@ pub enum Error {
     /// Whoever asked for the work wants it no more.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// No cage can be generated.
+    #[error(transparent)]
+    Caging(#[from] CagingError),
     /// An argument names no member of a family.
     #[error("there is no {family} named {name:?}; known: {known}")]
     UnknownName {
@@ -197,4 +201,75 @@ pub enum PoseError {
     Singular { pivot_ratio: f64 },
     #[error("in this pose the posed cage cannot be edited: the closest rest cage misses the wanted one by {miss:.1e} of the size")]
     Unreachable { miss: f64 },
+}
+
+/// Why no cage was generated. Each fault names its place where it has one.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs)]
+pub enum CagingError {
+    #[error("the skin has no faces to put a cage around")]
+    SkinEmpty,
+    #[error("skin face {face} has {corners} corners; a face needs at least 3")]
+    FewCorners { face: usize, corners: usize },
+    #[error("skin face {face} uses vertex {vertex}, but the skin has {vertices} vertices")]
+    BadIndex { face: usize, vertex: i64, vertices: usize },
+    #[error("skin vertex {vertex} has a coordinate that is not finite")]
+    SkinNotFinite { vertex: usize },
+    #[error("the skin is open at edge {a}-{b}, near {}; close it, or cage a voxel-remeshed copy", at(.place))]
+    OpenSkin { a: usize, b: usize, place: Point },
+    #[error("the skin is not manifold: edge {a}-{b}, near {}, belongs to {count} faces; a voxel-remeshed copy can be caged", at(.place))]
+    NonManifoldSkin { a: usize, b: usize, count: usize, place: Point },
+    #[error("the faces of the skin have no common orientation near {}", at(.place))]
+    NotOrientable { place: Point },
+    #[error("the skin encloses no volume")]
+    NoVolume,
+    #[error("the skeleton has no nodes or no edges")]
+    SkeletonEmpty,
+    #[error("skeleton node {node} has a coordinate that is not finite")]
+    NodeNotFinite { node: usize },
+    #[error("skeleton edge {edge} names node {node}, but there are {nodes} nodes")]
+    BadEdge { edge: usize, node: i64, nodes: usize },
+    #[error("no part of the skeleton is inside the skin")]
+    SkeletonOutside,
+    #[error("the skeleton inside the skin is in {parts} parts; node {node}, near {}, is not connected to the rest", at(.place))]
+    SkeletonInParts { parts: usize, node: usize, place: Point },
+    #[error("a part of the skin near {} is not around the skeleton; join it to the rest or leave it out", at(.place))]
+    StrayPart { place: Point },
+    #[error("bending node {row} has a coordinate that is not finite")]
+    BendingNotFinite { row: usize },
+    #[error("the skeleton is too short for a cage: it has {sections} cross sections and needs at least 2")]
+    TooFewSections { sections: usize },
+    #[error("no cross section was found at control node {node}, near {}; move it along its bone", at(.place))]
+    NoSection { node: usize, place: Point },
+    #[error("the cage crosses itself before it starts to grow, near control node {node} at {}; move that node or its neighbours apart", at(.place))]
+    NoStart { node: usize, place: Point },
+    #[error("the cage can't grow around the skin near control node {node} at {}: a bending node is needed there", at(.place))]
+    Stuck { node: usize, place: Point },
+    #[error("the cage was refused by the final check near control node {node} at {}: {fault}; a bending node is needed there", at(.place))]
+    NotValid { node: usize, place: Point, fault: &'static str },
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl CagingError {
+    /// Where it is: the control or skeleton node, if one is meant, and a point in the skin's space.
+    pub fn place(&self) -> (Option<usize>, Option<Point>) {
+        match self {
+            Self::NoSection { node, place }
+            | Self::NoStart { node, place }
+            | Self::Stuck { node, place }
+            | Self::NotValid { node, place, .. }
+            | Self::SkeletonInParts { node, place, .. } => (Some(*node), Some(*place)),
+            Self::OpenSkin { place, .. }
+            | Self::NonManifoldSkin { place, .. }
+            | Self::NotOrientable { place }
+            | Self::StrayPart { place } => (None, Some(*place)),
+            Self::NodeNotFinite { node } => (Some(*node), None),
+            _ => (None, None),
+        }
+    }
+}
+
+fn at(place: &Point) -> String {
+    format!("({:.4}, {:.4}, {:.4})", place.x, place.y, place.z)
 }

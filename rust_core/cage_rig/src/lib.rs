@@ -14,6 +14,7 @@
 #![allow(rustdoc::broken_intra_doc_links)] // [CTL*20] and its like are citations
 
 mod cage;
+pub mod caging;
 pub mod coordinates;
 mod error;
 mod geometry;
@@ -34,7 +35,7 @@ extern crate self as cage_rig;
 pub(crate) mod fixtures;
 
 pub use cage::Cage;
-pub use error::{CageError, Error, PoseError, SkeletonError, SkinError, WeightsError};
+pub use error::{CageError, CagingError, Error, PoseError, SkeletonError, SkinError, WeightsError};
 pub use mesh::Polygons;
 pub use points::{bounding_diagonal, Matrix3, Point, Transform, LARGEST};
 pub use progress::{unwatched, Cancelled, Part, Progress};

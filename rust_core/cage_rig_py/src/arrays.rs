@@ -107,6 +107,12 @@ fn integer_block(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyRe
     Ok(Block { data, shape: array.shape().to_vec() })
 }
 
+/// Pairs of indices, `n by 2`.
+pub(crate) fn pairs(value: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec<[i64; 2]>> {
+    let block = integer_block(value, argument, &[("#E", None), ("2", Some(2))])?;
+    Ok(block.data.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
+}
+
 /// One number for each of `rows`, in the frame's single precision.
 pub(crate) fn singles(
     value: &Bound<'_, PyAny>,

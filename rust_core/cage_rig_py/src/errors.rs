@@ -18,6 +18,12 @@ create_exception!(
 );
 create_exception!(
     cage_rig_core,
+    CagingError,
+    CageRigError,
+    "No cage was generated; `node` and `place` say where the fault is, or are None."
+);
+create_exception!(
+    cage_rig_core,
     ArrayError,
     CageRigError,
     "An argument has the wrong shape, type or values."
@@ -37,8 +43,21 @@ pub(crate) fn raise(error: impl Into<Error>) -> PyErr {
         Error::Pose(_) => PoseError::new_err(message),
         Error::Cancelled(_) => Cancelled::new_err(message),
         Error::Size { .. } | Error::NotFinite { .. } | Error::AllZero { .. } => ArrayError::new_err(message),
+        Error::Caging(fault) => caging_error(&fault, message),
         Error::UnknownName { .. } | Error::Option { .. } => CageRigError::new_err(message),
     }
+}
+
+fn caging_error(fault: &cage_rig::CagingError, message: String) -> PyErr {
+    let raised = CagingError::new_err(message);
+    let (node, place) = fault.place();
+    let named = Python::attach(|py| {
+        let value = raised.value(py);
+        value.setattr("node", node)?;
+        value.setattr("cancelled", matches!(fault, cage_rig::CagingError::Cancelled))?;
+        value.setattr("place", place.map(|p| (p.x, p.y, p.z)))
+    });
+    named.err().unwrap_or(raised)
 }
 
 /// `?` for the core's results.
@@ -56,6 +75,7 @@ impl<T, E: Into<Error>> OrRaise<T> for Result<T, E> {
 pub(crate) fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     module.add("CageRigError", py.get_type::<CageRigError>())?;
+    module.add("CagingError", py.get_type::<CagingError>())?;
     module.add("CageError", py.get_type::<CageError>())?;
     module.add("SkinError", py.get_type::<SkinError>())?;
     module.add("WeightsError", py.get_type::<WeightsError>())?;

@@ -2,6 +2,7 @@
 //! arrays at the door, releases the GIL around work, and turns errors into exceptions.
 
 mod arrays;
+mod caging;
 mod errors;
 mod functions;
 mod input;
@@ -19,5 +20,6 @@ fn cage_rig_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<jobs::BindJob>()?;
     module.add_class::<jobs::MethodJob>()?;
     functions::add_to(module)?;
+    caging::add_to(module)?;
     errors::add_to(module)
 }

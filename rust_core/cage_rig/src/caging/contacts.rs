@@ -1,0 +1,137 @@
+//! Which features of a cage face which of the skin, or of the cage itself, across a small gap.
+//!
+//! Every vertex and edge belongs to one of its triangles, so that no gap is listed twice.
+
+use crate::geometry::bvh::Bvh;
+use crate::geometry::collision::{across, weights, width, Gap};
+use crate::points::Point;
+use rayon::prelude::*;
+use std::collections::HashSet;
+
+/// A gap between four points; indices from the number of cage vertices on are the obstacle's.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Contact {
+    pub(crate) gap: Gap,
+    pub(crate) at: [u32; 4],
+}
+
+/// A mesh whose features are told apart, with boxes around its triangles.
+pub(crate) struct Body {
+    pub(crate) tree: Bvh,
+    /// Which corners and which sides (k to k + 1) a triangle owns.
+    owns: Vec<([bool; 3], [bool; 3])>,
+}
+
+impl Body {
+    pub(crate) fn new(points: &[Point], triangles: &[[u32; 3]]) -> Self {
+        let (mut corners, mut sides) = (HashSet::new(), HashSet::new());
+        let owns = triangles
+            .iter()
+            .map(|t| {
+                let own = [0, 1, 2].map(|k| corners.insert(t[k]));
+                (own, [0, 1, 2].map(|k| sides.insert((t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])))))
+            })
+            .collect();
+        Self { tree: Bvh::new(points, triangles), owns }
+    }
+}
+
+/// The points of both bodies, as contacts count them.
+pub(crate) struct Points<'a> {
+    pub(crate) cage: &'a [Point],
+    pub(crate) obstacle: &'a [Point],
+}
+
+impl Points<'_> {
+    pub(crate) fn of(&self, contact: &Contact) -> [Point; 4] {
+        let n = self.cage.len();
+        contact
+            .at
+            .map(|v| if (v as usize) < n { self.cage[v as usize] } else { self.obstacle[v as usize - n] })
+    }
+
+    pub(crate) fn width(&self, contact: &Contact) -> f64 {
+        width(contact.gap, &self.of(contact))
+    }
+
+    /// Weights, unit vector across, and width.
+    pub(crate) fn gap(&self, contact: &Contact) -> ([f64; 4], Point, f64) {
+        let x = self.of(contact);
+        let w = weights(contact.gap, &x);
+        let vector = across(&w, &x);
+        let width = vector.norm();
+        (w, vector / width.max(1e-300), width)
+    }
+}
+
+/// All gaps narrower than `reach` that the cage has a part in. Trees must be fitted to `points`.
+pub(crate) fn contacts(cage: &Body, obstacle: &Body, points: &Points, reach: f64) -> Vec<Contact> {
+    let faces = cage.tree.triangles();
+    let near = |at: usize| {
+        let mut found = Vec::new();
+        with_obstacle(at, cage, obstacle, points, reach, &mut found);
+        with_itself(at, cage, points, reach, &mut found);
+        found
+    };
+    (0..faces.len()).into_par_iter().flat_map_iter(near).collect()
+}
+
+fn push(found: &mut Vec<Contact>, contact: Contact, points: &Points, reach: f64) {
+    if points.width(&contact) < reach {
+        found.push(contact);
+    }
+}
+
+fn with_obstacle(
+    at: usize,
+    cage: &Body,
+    obstacle: &Body,
+    points: &Points,
+    reach: f64,
+    found: &mut Vec<Contact>,
+) {
+    let n = points.cage.len() as u32;
+    let a = cage.tree.triangles()[at];
+    let (own_corners, own_sides) = cage.owns[at];
+    let corners = a.map(|v| &points.cage[v as usize]);
+    obstacle.tree.near_triangle(corners, reach, |t| {
+        let b = obstacle.tree.triangles()[t as usize].map(|v| v + n);
+        let (corners, sides) = obstacle.owns[t as usize];
+        let mut add = |gap, at| push(found, Contact { gap, at }, points, reach);
+        for k in 0..3 {
+            if corners[k] {
+                add(Gap::PointTriangle, [b[k], a[0], a[1], a[2]]);
+            }
+            if own_corners[k] {
+                add(Gap::PointTriangle, [a[k], b[0], b[1], b[2]]);
+            }
+            for m in 0..3 {
+                if own_sides[k] && sides[m] {
+                    add(Gap::EdgeEdge, [a[k], a[(k + 1) % 3], b[m], b[(m + 1) % 3]]);
+                }
+            }
+        }
+    });
+}
+
+fn with_itself(at: usize, cage: &Body, points: &Points, reach: f64, found: &mut Vec<Contact>) {
+    let a = cage.tree.triangles()[at];
+    let own_sides = cage.owns[at].1;
+    cage.tree.near_triangle(a.map(|v| &points.cage[v as usize]), reach, |t| {
+        let b = cage.tree.triangles()[t as usize];
+        let (corners, sides) = cage.owns[t as usize];
+        let mut add = |gap, at| push(found, Contact { gap, at }, points, reach);
+        for k in 0..3 {
+            if corners[k] && !a.contains(&b[k]) {
+                add(Gap::PointTriangle, [b[k], a[0], a[1], a[2]]);
+            }
+            for m in 0..3 {
+                let (p, q) = ([a[k], a[(k + 1) % 3]], [b[m], b[(m + 1) % 3]]);
+                let ordered = (p[0].min(p[1]), p[0].max(p[1])) < (q[0].min(q[1]), q[0].max(q[1]));
+                if own_sides[k] && sides[m] && ordered && !p.contains(&q[0]) && !p.contains(&q[1]) {
+                    add(Gap::EdgeEdge, [p[0], p[1], q[0], q[1]]);
+                }
+            }
+        }
+    });
+}

@@ -1,0 +1,250 @@
+//! Inflation: the skin grows back from its thread, the cage gives way and never crosses anything.
+//!
+//! In the spirit of nested cages [SVJ15], with the means of [IPC]: skin and cage move together, as far
+//! as additive continuous collision detection lets every gap stay open; then the cage relaxes by
+//! Newton steps under a barrier. At the end pressure draws it tight around the resting skin. Cost:
+//! about a hundred steps, each linear in the gaps narrower than a few per cent of the size.
+
+use super::contacts::{contacts, Body, Contact, Points};
+use super::contraction::Start;
+use super::energy::{energy, newton_step, Shape, Weights};
+use super::progress::Progress;
+use super::tubes::Scaffold;
+use crate::error::CagingError;
+use crate::geometry::collision::free_part;
+use crate::points::Point;
+use rayon::prelude::*;
+
+/// Limits of inflation; lengths relative to the bounding diagonal of the skin.
+#[derive(Debug, Clone, Copy)]
+pub struct InflationOptions {
+    /// Gaps narrower than this push, to begin with.
+    pub reach: f64,
+    /// Gaps end at least this wide.
+    pub clearance: f64,
+    /// Strength of the final pressure; 0 leaves the cage as it grew.
+    pub tightness: f64,
+    /// Newton steps of the final tightening.
+    pub rounds: usize,
+}
+
+impl Default for InflationOptions {
+    fn default() -> Self {
+        Self { reach: 4e-3, clearance: 3e-4, tightness: 1.0, rounds: 40 }
+    }
+}
+
+/// The farthest anything moves in one step.
+const STEP: f64 = 3e-3;
+
+/// A cage in the middle of its growth.
+pub(crate) struct Inflation<'a> {
+    scaffold: &'a Scaffold,
+    faces: Vec<[u32; 3]>,
+    edges: Vec<(u32, u32)>,
+    mirror: Option<&'a [u32]>,
+    pub(crate) cage: Vec<Point>,
+    body: Body,
+}
+
+/// Where growth came to a halt: a cage vertex.
+pub(crate) struct Halt {
+    pub(crate) vertex: usize,
+}
+
+impl<'a> Inflation<'a> {
+    pub(crate) fn new(scaffold: &'a Scaffold, mirror: Option<&'a [u32]>, cage: Vec<Point>) -> Self {
+        let faces = scaffold.triangles();
+        let mut edges: Vec<(u32, u32)> = faces
+            .iter()
+            .flat_map(|t| [0, 1, 2].map(|k| (t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3]))))
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let body = Body::new(&cage, &faces);
+        Self { scaffold, faces, edges, mirror, cage, body }
+    }
+
+    /// Grows from `start` around the obstacle `rest` with `triangles`, to a gap of `least`.
+    pub(crate) fn grow(
+        &mut self,
+        start: Start,
+        (rest, triangles): (&[Point], &[[u32; 3]]),
+        options: &InflationOptions,
+        least: f64,
+        progress: &Progress,
+    ) -> Result<Result<(), Halt>, CagingError> {
+        let mut obstacle = start.obstacle;
+        let mut body = Body::new(&obstacle, triangles);
+        let ways: Vec<Point> = rest.iter().zip(&obstacle).map(|(p, q)| p - q).collect();
+        let far = ways.iter().map(|w| w.norm()).fold(1e-12, f64::max);
+        let target = |t: f64| self.scaffold.scaled(start.scale + (1.05 - start.scale) * t);
+        let mut weights = Weights {
+            shape: 1.0,
+            anchor: 0.02,
+            volume: 0.0,
+            quality: 2e-5,
+            reach: options.reach,
+            least: 0.0,
+        };
+        let (mut t, mut stalled, mut softened) = (0.0_f64, 0, 0);
+        let mut goal = target(0.0);
+        for _ in 0..1500 {
+            progress.step("inflation", 0.9 * t)?;
+            let dt = (STEP / far).min(1.0 - t);
+            let wanted = target(t + dt);
+            let mut moves: Vec<Point> = wanted.iter().zip(&goal).map(|(p, q)| p - q).collect();
+            let longest = moves.iter().map(|m| m.norm()).fold(1e-300, f64::max);
+            moves.iter_mut().for_each(|m| *m *= (STEP / longest).min(1.0));
+            self.body.tree.refit(&self.cage);
+            body.tree.refit(&obstacle);
+            let points = Points { cage: &self.cage, obstacle: &obstacle };
+            let found = contacts(&self.body, &body, &points, weights.reach + least + 4.0 * STEP);
+            let narrowest = found.par_iter().map(|c| points.width(c)).reduce(|| f64::INFINITY, f64::min);
+            weights.least = least.min(weights.least + 0.5 * (narrowest - weights.least).max(0.0));
+            let steps: Vec<Point> = ways.iter().map(|w| w * dt).collect();
+            let mut part = self.free(&found, &points, Some(&moves), Some(&steps), weights.least);
+            if part < 0.05 {
+                // The cage's own way may be what blocks: it stays then.
+                moves.iter_mut().for_each(|m| *m = Point::zeros());
+                part = self.free(&found, &points, None, Some(&steps), weights.least);
+            }
+            self.cage.iter_mut().zip(&moves).for_each(|(p, m)| *p += m * part);
+            obstacle.iter_mut().zip(&steps).for_each(|(p, m)| *p += m * part);
+            t += dt * part;
+            if 1.0 - t < 1e-12 {
+                t = 1.0;
+                obstacle.copy_from_slice(rest);
+            }
+            goal = target(t);
+            self.relax(&found, &obstacle, &goal, &weights, 3);
+            if t >= 1.0 && weights.least >= 0.999 * least {
+                return Ok(Ok(()));
+            }
+            let slow = if t >= 1.0 {
+                weights.least < 0.5 * least && narrowest < 2.0 * weights.least
+            } else {
+                part * dt * far < 1e-3 * STEP
+            };
+            stalled = if slow { stalled + 1 } else { 0 };
+            if stalled > 25 {
+                if softened < 3 {
+                    softened += 1;
+                    stalled = 0;
+                    weights.shape *= 0.2;
+                    weights.anchor *= 0.2;
+                    weights.reach *= 0.6;
+                    continue;
+                }
+                return Ok(Err(self.halt(&obstacle, &found)));
+            }
+        }
+        Ok(Err(self.halt(&obstacle, &[])))
+    }
+
+    fn halt(&self, obstacle: &[Point], found: &[Contact]) -> Halt {
+        let points = Points { cage: &self.cage, obstacle };
+        let narrow = found.iter().min_by(|a, b| points.width(a).total_cmp(&points.width(b)));
+        let own = narrow.and_then(|c| c.at.into_iter().find(|v| (*v as usize) < self.cage.len()));
+        Halt { vertex: own.unwrap_or(0) as usize }
+    }
+
+    /// Tightens the cage around a resting obstacle, to a gap of `least`.
+    pub(crate) fn tighten(
+        &mut self,
+        (rest, triangles): (&[Point], &[[u32; 3]]),
+        options: &InflationOptions,
+        progress: &Progress,
+    ) -> Result<(), CagingError> {
+        let body = Body::new(rest, triangles);
+        let mut reach = options.reach;
+        let mut stiffness = 0.3;
+        for round in 0..options.rounds {
+            progress.step("inflation", 0.9 + 0.1 * round as f64 / options.rounds as f64)?;
+            self.body.tree.refit(&self.cage);
+            let points = Points { cage: &self.cage, obstacle: rest };
+            let found = contacts(&self.body, &body, &points, reach + options.clearance + 2.0 * STEP);
+            let narrowest = found.par_iter().map(|c| points.width(c)).reduce(|| f64::INFINITY, f64::min);
+            let weights = Weights {
+                shape: stiffness,
+                anchor: 1e-3,
+                volume: options.tightness,
+                quality: 1e-4,
+                reach,
+                least: options.clearance.min(0.5 * narrowest),
+            };
+            let here = self.cage.clone();
+            let moved = self.relax(&found, rest, &here, &weights, 2);
+            if round % 8 == 7 {
+                reach = (0.6 * reach).max(4.0 * options.clearance);
+                stiffness = (0.5 * stiffness).max(0.05);
+            }
+            if moved < 2e-5 && reach <= 4.1 * options.clearance {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Newton steps toward `goal`, none longer than a step together. How far anything moved.
+    fn relax(
+        &mut self,
+        found: &[Contact],
+        obstacle: &[Point],
+        goal: &[Point],
+        weights: &Weights,
+        rounds: usize,
+    ) -> f64 {
+        let edges = std::mem::take(&mut self.edges);
+        let shape = Shape { faces: &self.faces, edges: &edges, rest: goal, mirror: self.mirror };
+        let mut left = STEP;
+        for _ in 0..rounds {
+            let points = Points { cage: &self.cage, obstacle };
+            let mut step = newton_step(&shape, &points, found, weights);
+            let longest = step.iter().map(|s| s.norm()).fold(1e-300, f64::max);
+            if !longest.is_finite() || left < 1e-6 {
+                break;
+            }
+            step.iter_mut().for_each(|s| *s *= (left / longest).min(1.0));
+            let longest = longest.min(left);
+            let mut part = self.free(found, &points, Some(&step), None, weights.least);
+            let before = energy(&shape, &points, found, weights);
+            let mut moved = None;
+            for _ in 0..10 {
+                let next: Vec<Point> = self.cage.iter().zip(&step).map(|(p, s)| p + s * part).collect();
+                if energy(&shape, &Points { cage: &next, obstacle }, found, weights) < before {
+                    moved = Some(next);
+                    break;
+                }
+                part *= 0.5;
+            }
+            let Some(next) = moved else { break };
+            self.cage = next;
+            left -= part * longest;
+            if part * longest < 1e-3 * weights.reach {
+                break;
+            }
+        }
+        self.edges = edges;
+        STEP - left
+    }
+
+    /// The part of the moves after which every gap is open.
+    fn free(
+        &self,
+        found: &[Contact],
+        points: &Points,
+        cage: Option<&[Point]>,
+        obstacle: Option<&[Point]>,
+        least: f64,
+    ) -> f64 {
+        let n = self.cage.len();
+        let way = |v: u32| {
+            let v = v as usize;
+            let moves = if v < n { cage.and_then(|m| m.get(v)) } else { obstacle.and_then(|m| m.get(v - n)) };
+            moves.copied().unwrap_or_else(Point::zeros)
+        };
+        let part = |c: &Contact| free_part(c.gap, &points.of(c), &c.at.map(way), least);
+        found.par_iter().with_min_len(256).map(part).reduce(|| 1.0, f64::min)
+    }
+}

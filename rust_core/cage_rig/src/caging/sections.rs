@@ -1,0 +1,232 @@
+//! Cross sections: field lines from a small circle out to the skin, and a quad of their ends.
+//!
+//! [CLM*19] §5–6. Twenty seeds on a circle around the control node follow the gradient of its
+//! [`Field`]; the ring of ends is looked at in its principal axes. The paper takes, for each
+//! quadrant, the extreme ring point, and can take one twice (at toes); here the four are distinct, in
+//! cyclic order and spaced, chosen together. A window costs about 20 ms; windows run in parallel.
+
+use super::control_nodes::ControlNode;
+use super::field::Field;
+use super::progress::Progress;
+use super::skeleton::CurveSkeleton;
+use super::skin::Skin;
+use crate::error::CagingError;
+use crate::points::{Matrix3, Point};
+use rayon::prelude::*;
+
+/// Seeds on the circle.
+const SEEDS: usize = 20;
+
+/// How finely sections are looked for.
+#[derive(Debug, Clone, Copy)]
+pub struct SectionOptions {
+    /// Cells a side of a window; 48.
+    pub grid: usize,
+    /// Corners of a section, 3 to 8; 4 as in the paper.
+    pub corners: usize,
+}
+
+impl Default for SectionOptions {
+    fn default() -> Self {
+        Self { grid: 48, corners: 4 }
+    }
+}
+
+/// The cross section of one control node. Unit space.
+#[derive(Debug, Clone)]
+pub(crate) struct Section {
+    /// Where field lines meet the skin, counterclockwise about the arc's direction.
+    pub(crate) ring: Vec<Point>,
+    /// The chosen corners, in the same order.
+    pub(crate) corners: Vec<Point>,
+    pub(crate) center: Point,
+}
+
+/// One section for each control node.
+pub(crate) fn sections(
+    skin: &Skin,
+    skeleton: &CurveSkeleton,
+    nodes: &[ControlNode],
+    options: &SectionOptions,
+    progress: &Progress,
+) -> Result<Vec<Section>, CagingError> {
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    nodes
+        .par_iter()
+        .map(|node| {
+            let found = section(skin, skeleton, node, options);
+            let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+            progress.step("sections", count as f64 / nodes.len() as f64)?;
+            found.ok_or(CagingError::NoSection { node: node.node, place: skin.space.leave(&node.point) })
+        })
+        .collect()
+}
+
+/// The section of one node; `None` where the field lines don't reach the skin around it.
+pub(crate) fn section(
+    skin: &Skin,
+    skeleton: &CurveSkeleton,
+    node: &ControlNode,
+    options: &SectionOptions,
+) -> Option<Section> {
+    let field = Field::new(skin, skeleton, &node.point, node.radius, options.grid);
+    let (u, v) = frame(&node.direction);
+    let start = (0.2 * node.radius).max(1.3 * field.spacing);
+    let ring: Vec<Point> = (0..SEEDS)
+        .filter_map(|k| {
+            let angle = (k as f64 + 0.5) * std::f64::consts::TAU / SEEDS as f64;
+            let out = u * angle.cos() + v * angle.sin();
+            trace(skin, &field, node.point + out * start.min(0.5 * node.radius), out)
+        })
+        .collect();
+    if ring.len() < SEEDS / 2 {
+        return None;
+    }
+    let corners = corners(&ring, &node.direction, options.corners);
+    let center = corners.iter().sum::<Point>() / corners.len() as f64;
+    Some(Section { ring, corners, center })
+}
+
+/// Two axes at right angles to `direction` and each other, counterclockwise.
+pub(crate) fn frame(direction: &Point) -> (Point, Point) {
+    // The axis least along the direction; x first, so that mirrored nodes get mirrored seeds.
+    let pick = (0..3).min_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap_or(0);
+    let pick = if direction.x.abs() < 0.5 { 0 } else { pick };
+    let mut axis = Point::zeros();
+    axis[pick] = 1.0;
+    let v = direction.cross(&axis).normalize();
+    (v.cross(direction), v)
+}
+
+/// Follows the gradient from `p` to the skin. A line that leaves the window goes on straight.
+fn trace(skin: &Skin, field: &Field, mut p: Point, out: Point) -> Option<Point> {
+    let mut way = out;
+    let step = 0.3 * field.spacing;
+    let direction = |p: &Point| field.gradient(p).and_then(|g| g.try_normalize(1e-9));
+    for turn in 0..2000 {
+        // Lines end at the skin; one that wanders in a flat field goes on straight.
+        if turn == 400 {
+            way = out;
+        }
+        if let Some(first) = direction(&p).filter(|_| turn < 400) {
+            way = direction(&(p + first * (0.5 * step))).unwrap_or(first);
+        }
+        let next = p + way * step;
+        if !skin.contains(&next) {
+            let (mut inside, mut outside) = (p, next);
+            for _ in 0..24 {
+                let middle = (inside + outside) * 0.5;
+                if skin.contains(&middle) {
+                    inside = middle
+                } else {
+                    outside = middle
+                }
+            }
+            return Some(outside);
+        }
+        p = next;
+    }
+    None
+}
+
+/// `count` corners of the ring, counterclockwise about `direction`.
+fn corners(ring: &[Point], direction: &Point, count: usize) -> Vec<Point> {
+    let (axes, spread) = principal_axes(ring, direction);
+    let center = ring.iter().sum::<Point>() / ring.len() as f64;
+    let flat: Vec<[f64; 2]> = ring
+        .iter()
+        .map(|p| [(p - center).dot(&axes[0]) / spread[0], (p - center).dot(&axes[1]) / spread[1]])
+        .collect();
+    let aims: Vec<[f64; 2]> = (0..count)
+        .map(|k| {
+            let angle = (k as f64 + 0.5) * std::f64::consts::TAU / count as f64;
+            [angle.cos(), angle.sin()]
+        })
+        .collect();
+    let score = |aim: usize, at: usize| aims[aim][0] * flat[at][0] + aims[aim][1] * flat[at][1];
+    // The best increasing choice with gaps of two, from each possible first ring point.
+    let (n, gap) = (ring.len(), (ring.len() / (3 * count)).max(1));
+    let mut best = (f64::NEG_INFINITY, Vec::new());
+    for first in 0..n {
+        let (value, chosen) = choose(first, n, gap, count, &score);
+        if value > best.0 {
+            best = (value, chosen);
+        }
+    }
+    best.1.iter().map(|k| ring[*k % n]).collect()
+}
+
+/// The best places for aims 1.. after aim 0 at `first`, cyclic, at least `gap` apart.
+fn choose(
+    first: usize,
+    n: usize,
+    gap: usize,
+    count: usize,
+    score: &impl Fn(usize, usize) -> f64,
+) -> (f64, Vec<usize>) {
+    let mut table = vec![vec![(f64::NEG_INFINITY, 0); n]; count];
+    table[0][0] = (score(0, first), 0);
+    for aim in 1..count {
+        for at in aim * gap..n {
+            let before = (0..=at - gap).map(|k| (table[aim - 1][k].0, k));
+            if let Some((value, k)) = before.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                table[aim][at] = (value + score(aim, (first + at) % n), k);
+            }
+        }
+    }
+    let ends = (0..=n - gap).map(|at| (table[count - 1][at].0, at));
+    let Some((value, mut at)) = ends.max_by(|a, b| a.0.total_cmp(&b.0)) else {
+        return (f64::NEG_INFINITY, Vec::new());
+    };
+    let mut chosen = vec![0; count];
+    for aim in (0..count).rev() {
+        chosen[aim] = first + at;
+        at = table[aim][at].1;
+    }
+    (value, chosen)
+}
+
+/// The two principal axes of the ring, the second a quarter turn left of the first about
+/// `direction`, and the spread along each.
+fn principal_axes(ring: &[Point], direction: &Point) -> ([Point; 2], [f64; 2]) {
+    let center = ring.iter().sum::<Point>() / ring.len() as f64;
+    let (u, v) = frame(direction);
+    let covariance: Matrix3 =
+        ring.iter().map(|p| (p - center) * (p - center).transpose()).sum::<Matrix3>() / ring.len() as f64;
+    // Within the plane across the arc: along the arc a section has no corners to choose.
+    let (a, b, c) = (u.dot(&(covariance * u)), u.dot(&(covariance * v)), v.dot(&(covariance * v)));
+    let angle = if (2.0 * b).hypot(a - c) < 0.05 * (a + c) { 0.0 } else { 0.5 * (2.0 * b).atan2(a - c) };
+    let first = u * angle.cos() + v * angle.sin();
+    let second = direction.cross(&first);
+    let along = |axis: &Point| axis.dot(&(covariance * axis)).max(1e-300).sqrt();
+    ([first, second], [along(&first), along(&second)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::caging::control_nodes::{control_nodes, Placement};
+    use crate::caging::skeleton::curve_skeleton;
+    use crate::fixtures::shapes::square_tube;
+
+    #[test]
+    fn a_square_bar_has_sections_with_its_corners() {
+        let rings: Vec<(f64, f64)> = (0..11).map(|i| (f64::from(i), 1.0)).collect();
+        let (vertices, faces) = square_tube(&rings);
+        let skin = Skin::new(&vertices, &faces).expect("closed");
+        let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]]).expect("inside");
+        let nodes = control_nodes(&skin, &skeleton, Some(&[Point::new(5.0, 0.3, 0.0)]), Placement::Joints);
+        let nodes = nodes.expect("three");
+        assert_eq!(nodes.len(), 3);
+        let found = sections(&skin, &skeleton, &nodes, &SectionOptions::default(), &Progress::silent());
+        let found = found.expect("sections");
+        let middle: Vec<Point> = found[1].corners.iter().map(|p| skin.space.leave(p)).collect();
+        for p in &middle {
+            assert!((p.x - 5.0).abs() < 0.1, "{p}");
+            assert!(p.y.abs() > 0.7 && p.z.abs() > 0.7 && p.y.abs().max(p.z.abs()) < 1.01, "{p}");
+        }
+        let turn = (middle[1] - middle[0]).cross(&(middle[2] - middle[0]));
+        assert!(turn.x > 0.0);
+    }
+}

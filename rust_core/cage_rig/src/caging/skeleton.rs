@@ -1,0 +1,395 @@
+//! The curve skeleton: arcs between leaves and branching nodes, inside the skin.
+//!
+//! [CLM*19] §3 takes a curve skeleton as given; here any graph of nodes and edges is made into one.
+//! Nodes outside the skin are clipped toward their inside end and recentred (uphill in the distance
+//! to the skin); what stays outside is dropped. Leaves that don't stick out of the part they start
+//! from, as the bones of a face, are pruned, and branching nodes closer than their radius merged.
+//! Linear in the nodes but for pruning, which looks at pairs of leaves.
+
+use super::skin::Skin;
+use crate::error::CagingError;
+use crate::points::{first_not_finite, Point};
+use rayon::prelude::*;
+
+/// Depth below which a node counts as outside, relative to the size.
+const MARGIN: f64 = 2e-3;
+
+/// A curve skeleton in unit space.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct CurveSkeleton {
+    pub(crate) junctions: Vec<Junction>,
+    pub(crate) arcs: Vec<Arc>,
+    /// Nodes of the input that take no part.
+    pub(crate) dropped: Vec<usize>,
+}
+
+/// Where arcs end.
+#[derive(Debug, Clone)]
+pub(crate) struct Junction {
+    pub(crate) point: Point,
+    pub(crate) radius: f64,
+    pub(crate) node: usize,
+    /// Arcs that end here, an arc twice when it is a loop.
+    pub(crate) degree: usize,
+}
+
+/// A polyline between two junctions.
+#[derive(Debug, Clone)]
+pub(crate) struct Arc {
+    pub(crate) ends: [usize; 2],
+    pub(crate) path: Vec<Point>,
+    /// Distance from the first end, of each point of the path.
+    pub(crate) along: Vec<f64>,
+    /// Depth of each point of the path.
+    pub(crate) radii: Vec<f64>,
+    /// The input's node at each point of the path, where it is one.
+    pub(crate) nodes: Vec<Option<usize>>,
+}
+
+impl Arc {
+    pub(crate) fn length(&self) -> f64 {
+        self.along.last().copied().unwrap_or(0.0)
+    }
+
+    fn locate(&self, s: f64) -> (usize, f64) {
+        let last = self.path.len().saturating_sub(2);
+        let k = self.along.partition_point(|a| *a <= s).saturating_sub(1).min(last);
+        let span = self.along[k + 1] - self.along[k];
+        (k, if span > 0.0 { ((s - self.along[k]) / span).clamp(0.0, 1.0) } else { 0.0 })
+    }
+
+    pub(crate) fn at(&self, s: f64) -> Point {
+        let (k, t) = self.locate(s);
+        self.path[k] + (self.path[k + 1] - self.path[k]) * t
+    }
+
+    pub(crate) fn radius_at(&self, s: f64) -> f64 {
+        let (k, t) = self.locate(s);
+        self.radii[k] + (self.radii[k + 1] - self.radii[k]) * t
+    }
+
+    /// Direction at `s`, over a stretch of `width` to both sides.
+    pub(crate) fn direction(&self, s: f64, width: f64) -> Point {
+        let (a, b) = (self.at((s - width).max(0.0)), self.at((s + width).min(self.length())));
+        (b - a).try_normalize(1e-12).unwrap_or_else(Point::x)
+    }
+
+    /// Nearest point: (distance, s).
+    pub(crate) fn nearest(&self, p: &Point) -> (f64, f64) {
+        let mut best = (f64::INFINITY, 0.0);
+        for k in 0..self.path.len() - 1 {
+            let (a, u) = (self.path[k], self.path[k + 1] - self.path[k]);
+            let t = ((p - a).dot(&u) / u.norm_squared().max(1e-300)).clamp(0.0, 1.0);
+            let distance = (a + u * t - p).norm();
+            if distance < best.0 {
+                best = (distance, self.along[k] + t * (self.along[k + 1] - self.along[k]));
+            }
+        }
+        best
+    }
+}
+
+/// The graph while it is being worked on.
+struct Graph {
+    points: Vec<Point>,
+    node: Vec<usize>,
+    edges: Vec<(usize, usize)>,
+    dropped: Vec<usize>,
+}
+
+/// Cleans the graph of `nodes` (`#N by 3`, the user's space) and `edges` and cuts it into arcs.
+pub(crate) fn curve_skeleton(
+    skin: &Skin,
+    nodes: &[Point],
+    edges: &[[i64; 2]],
+) -> Result<CurveSkeleton, CagingError> {
+    let mut graph = read(skin, nodes, edges)?;
+    clip(skin, &mut graph)?;
+    keep_largest(&mut graph);
+    recentre(skin, &mut graph);
+    loop {
+        let skeleton = cut(skin, &graph);
+        if skeleton.arcs.is_empty() {
+            return Err(CagingError::SkeletonOutside);
+        }
+        if !prune(skin, &mut graph, &skeleton) && !merge(&mut graph, &skeleton) {
+            return Ok(skeleton);
+        }
+    }
+}
+
+fn read(skin: &Skin, nodes: &[Point], edges: &[[i64; 2]]) -> Result<Graph, CagingError> {
+    if nodes.is_empty() || edges.is_empty() {
+        return Err(CagingError::SkeletonEmpty);
+    }
+    if let Some(node) = first_not_finite(nodes) {
+        return Err(CagingError::NodeNotFinite { node });
+    }
+    for (edge, ends) in edges.iter().enumerate() {
+        if let Some(&node) = ends.iter().find(|n| **n < 0 || **n >= nodes.len() as i64) {
+            return Err(CagingError::BadEdge { edge, node, nodes: nodes.len() });
+        }
+    }
+    let mut graph = Graph { points: Vec::new(), node: Vec::new(), edges: Vec::new(), dropped: Vec::new() };
+    let mut place = Vec::with_capacity(nodes.len());
+    for (node, p) in nodes.iter().enumerate() {
+        let p = skin.space.enter(p);
+        let same = graph.points.iter().position(|q| (q - p).norm() < 1e-4);
+        place.push(same.unwrap_or(graph.points.len()));
+        if same.is_none() {
+            graph.points.push(p);
+            graph.node.push(node);
+        }
+    }
+    for [a, b] in edges {
+        join(&mut graph.edges, place[*a as usize], place[*b as usize]);
+    }
+    Ok(graph)
+}
+
+fn join(edges: &mut Vec<(usize, usize)>, a: usize, b: usize) {
+    let edge = (a.min(b), a.max(b));
+    if a != b && !edges.contains(&edge) {
+        edges.push(edge);
+    }
+}
+
+fn clip(skin: &Skin, graph: &mut Graph) -> Result<(), CagingError> {
+    let mut depth: Vec<f64> = graph.points.par_iter().map(|p| skin.depth(p)).collect();
+    // From the inside outward, so that a chain that leaves the skin is followed to its end.
+    loop {
+        let next = graph.edges.iter().find_map(|&(a, b)| match (depth[a] > MARGIN, depth[b] > MARGIN) {
+            (true, false) if depth[b].is_finite() => Some((a, b)),
+            (false, true) if depth[a].is_finite() => Some((b, a)),
+            _ => None,
+        });
+        let Some((inside, outside)) = next else { break };
+        let (p, q) = (graph.points[inside], graph.points[outside]);
+        let found = (1..20).rev().map(|k| p + (q - p) * (f64::from(k) / 20.0)).find_map(|x| {
+            let d = skin.depth(&x);
+            (d > MARGIN).then_some((x, d))
+        });
+        match found {
+            Some((x, d)) => (graph.points[outside], depth[outside]) = (x, d),
+            None => depth[outside] = f64::NEG_INFINITY,
+        }
+    }
+    if depth.iter().all(|d| *d <= MARGIN) {
+        return Err(CagingError::SkeletonOutside);
+    }
+    graph.edges.retain(|(a, b)| depth[*a] > MARGIN && depth[*b] > MARGIN);
+    graph.dropped.extend((0..depth.len()).filter(|i| depth[*i] <= MARGIN).map(|i| graph.node[i]));
+    if graph.edges.is_empty() {
+        return Err(CagingError::SkeletonOutside);
+    }
+    Ok(())
+}
+
+/// Keeps the connected part with the greatest length; nodes of the others are dropped by name.
+fn keep_largest(graph: &mut Graph) {
+    let mut part: Vec<usize> = (0..graph.points.len()).collect();
+    let root = |part: &[usize], mut i: usize| {
+        while part[i] != i {
+            i = part[i];
+        }
+        i
+    };
+    for &(a, b) in &graph.edges {
+        let (a, b) = (root(&part, a), root(&part, b));
+        part[a.max(b)] = a.min(b);
+    }
+    let mut length = vec![0.0; part.len()];
+    for &(a, b) in &graph.edges {
+        length[root(&part, a)] += (graph.points[a] - graph.points[b]).norm();
+    }
+    let best = (0..part.len()).max_by(|a, b| length[*a].total_cmp(&length[*b]).then(b.cmp(a))).unwrap_or(0);
+    let kept: Vec<bool> = (0..part.len()).map(|i| root(&part, i) == best).collect();
+    graph.edges.retain(|(a, _)| kept[*a]);
+    let lost = (0..kept.len()).filter(|i| !kept[*i] && !graph.dropped.contains(&graph.node[*i]));
+    let lost: Vec<usize> = lost.map(|i| graph.node[i]).collect();
+    graph.dropped.extend(lost);
+}
+
+/// Moves nodes uphill in depth, across their bones rather than along them.
+fn recentre(skin: &Skin, graph: &mut Graph) {
+    let degree = |i: usize| graph.edges.iter().filter(|(a, b)| *a == i || *b == i).count();
+    let moved: Vec<Point> = (0..graph.points.len())
+        .into_par_iter()
+        .map(|i| {
+            let start = graph.points[i];
+            if degree(i) == 0 {
+                return start;
+            }
+            let around = graph.edges.iter().filter_map(|&(a, b)| match (a == i, b == i) {
+                (true, _) => Some(graph.points[b]),
+                (_, true) => Some(graph.points[a]),
+                _ => None,
+            });
+            let ways: Vec<Point> = around.filter_map(|q| (q - start).try_normalize(1e-12)).collect();
+            let axis = match ways[..] {
+                [u] => Some(u),
+                [u, v] => (u - v).try_normalize(1e-6),
+                _ => None,
+            };
+            climb(skin, start, axis)
+        })
+        .collect();
+    graph.points = moved;
+}
+
+/// Uphill in depth from `start`, at right angles to `axis`, at most a radius far.
+pub(crate) fn climb(skin: &Skin, start: Point, axis: Option<Point>) -> Point {
+    let mut at = start;
+    let mut depth = skin.depth(&at);
+    let limit = 1.5 * depth.max(4.0 * MARGIN);
+    for _ in 0..24 {
+        let Some(near) = skin.tree.nearest(&skin.points, &at) else { return at };
+        let mut up = at - near.point;
+        if let Some(axis) = axis {
+            up -= axis * axis.dot(&up);
+        }
+        let Some(up) = up.try_normalize(1e-12) else { return at };
+        let next = at + up * (0.12 * depth.max(MARGIN));
+        let found = skin.depth(&next);
+        if found <= depth * 1.002 || (next - start).norm() > limit {
+            return at;
+        }
+        (at, depth) = (next, found);
+    }
+    at
+}
+
+/// Cuts the graph at every node that is not in the middle of a polyline.
+fn cut(skin: &Skin, graph: &Graph) -> CurveSkeleton {
+    let mut around = vec![Vec::new(); graph.points.len()];
+    for (e, &(a, b)) in graph.edges.iter().enumerate() {
+        around[a].push((b, e));
+        around[b].push((a, e));
+    }
+    let mut skeleton = CurveSkeleton { dropped: graph.dropped.clone(), ..CurveSkeleton::default() };
+    let mut junction = vec![usize::MAX; graph.points.len()];
+    let mut used = vec![false; graph.edges.len()];
+    let ends = (0..around.len()).filter(|i| !around[*i].is_empty() && around[*i].len() != 2);
+    // After the ends: any node of what is left, a closed loop.
+    for start in ends.chain(0..around.len()) {
+        let whole_loop = around[start].len() == 2;
+        for &(next, edge) in &around[start] {
+            if used[edge] || (whole_loop && around[start].iter().all(|(_, e)| used[*e])) {
+                continue;
+            }
+            let mut walk = vec![start];
+            let (mut at, mut by) = (next, edge);
+            loop {
+                used[by] = true;
+                walk.push(at);
+                if around[at].len() != 2 || at == start {
+                    break;
+                }
+                let Some(&(on, e)) = around[at].iter().find(|(_, e)| *e != by) else { break };
+                (at, by) = (on, e);
+            }
+            let ends = [start, at].map(|i| {
+                if junction[i] == usize::MAX {
+                    junction[i] = skeleton.junctions.len();
+                    let (point, node) = (graph.points[i], graph.node[i]);
+                    skeleton.junctions.push(Junction { point, radius: skin.depth(&point), node, degree: 0 });
+                }
+                skeleton.junctions[junction[i]].degree += 1;
+                junction[i]
+            });
+            skeleton.arcs.push(arc(skin, graph, ends, &walk));
+        }
+    }
+    skeleton
+}
+
+fn arc(skin: &Skin, graph: &Graph, ends: [usize; 2], walk: &[usize]) -> Arc {
+    let length: f64 = walk.windows(2).map(|w| (graph.points[w[0]] - graph.points[w[1]]).norm()).sum();
+    let spacing = (length / 24.0).max(4e-3);
+    let (mut path, mut nodes) = (vec![graph.points[walk[0]]], vec![Some(graph.node[walk[0]])]);
+    for w in walk.windows(2) {
+        let (a, b) = (graph.points[w[0]], graph.points[w[1]]);
+        let pieces = ((b - a).norm() / spacing).ceil().max(1.0) as usize;
+        for k in 1..=pieces {
+            path.push(a + (b - a) * (k as f64 / pieces as f64));
+            nodes.push((k == pieces).then_some(graph.node[w[1]]));
+        }
+    }
+    let mut along = vec![0.0];
+    for w in path.windows(2) {
+        along.push(along[along.len() - 1] + (w[1] - w[0]).norm());
+    }
+    let radii = path.par_iter().map(|p| skin.depth(p).max(MARGIN)).collect();
+    Arc { ends, path, along, radii, nodes }
+}
+
+/// Removes one leaf arc that does not stick out. True when there was one.
+fn prune(skin: &Skin, graph: &mut Graph, skeleton: &CurveSkeleton) -> bool {
+    let mut leaves: Vec<(usize, usize, usize)> = Vec::new();
+    for (k, arc) in skeleton.arcs.iter().enumerate() {
+        for side in 0..2 {
+            let (tip, base) = (arc.ends[side], arc.ends[1 - side]);
+            if skeleton.junctions[tip].degree == 1 && skeleton.junctions[base].degree > 2 {
+                leaves.push((k, tip, base));
+            }
+        }
+    }
+    let reach =
+        |tip: usize, base: usize| (skeleton.junctions[tip].point - skeleton.junctions[base].point).norm();
+    leaves.sort_by(|a, b| reach(a.1, a.2).total_cmp(&reach(b.1, b.2)).then(a.0.cmp(&b.0)));
+    let hidden = |&(k, tip, base): &(usize, usize, usize)| {
+        let (p, b) = (skeleton.junctions[tip].point, &skeleton.junctions[base]);
+        let short = reach(tip, base) < 1.4 * b.radius || skeleton.arcs[k].length() < 1e-2;
+        let sibling = |&(other, far, at): &(usize, usize, usize)| {
+            let q = skeleton.junctions[far].point;
+            let ahead =
+                (p - b.point).dot(&(q - b.point)) > -0.2 * (p - b.point).norm() * (q - b.point).norm();
+            other != k && at == base && reach(far, at) >= reach(tip, base) && ahead && skin.sees(&p, &q, 12)
+        };
+        short || leaves.iter().any(sibling)
+    };
+    let Some(&(k, ..)) = leaves.iter().find(|leaf| hidden(leaf)) else { return false };
+    remove(graph, &skeleton.arcs[k], |junction| skeleton.junctions[junction].degree == 1);
+    true
+}
+
+fn remove(graph: &mut Graph, arc: &Arc, is_leaf: impl Fn(usize) -> bool) {
+    let on: Vec<usize> = arc.nodes.iter().flatten().copied().collect();
+    let index = |node: usize| graph.node.iter().position(|n| *n == node);
+    let steps: Vec<(usize, usize)> = on
+        .windows(2)
+        .filter_map(|w| Some((index(w[0])?, index(w[1])?)))
+        .map(|(a, b)| (a.min(b), a.max(b)))
+        .collect();
+    graph.edges.retain(|e| !steps.contains(e));
+    let inner = on.iter().enumerate().filter(|(i, _)| match *i {
+        0 => is_leaf(arc.ends[0]),
+        i if i + 1 == on.len() => is_leaf(arc.ends[1]),
+        _ => true,
+    });
+    let inner: Vec<usize> = inner.map(|(_, n)| *n).collect();
+    graph.dropped.extend(inner);
+}
+
+/// Merges two branching nodes closer than their radius. True when there were two.
+fn merge(graph: &mut Graph, skeleton: &CurveSkeleton) -> bool {
+    let close = skeleton.arcs.iter().find(|arc| {
+        let [a, b] = arc.ends.map(|e| &skeleton.junctions[e]);
+        arc.ends[0] != arc.ends[1]
+            && a.degree > 2
+            && b.degree > 2
+            && arc.length() < 0.9 * a.radius.max(b.radius)
+    });
+    let Some(arc) = close else { return false };
+    let [a, b] = arc.ends.map(|e| skeleton.junctions[e].node);
+    let index = |graph: &Graph, node: usize| graph.node.iter().position(|n| *n == node);
+    remove(graph, arc, |_| false);
+    let (Some(a), Some(b)) = (index(graph, a), index(graph, b)) else { return false };
+    graph.points[a] = (graph.points[a] + graph.points[b]) * 0.5;
+    let edges = std::mem::take(&mut graph.edges);
+    for (p, q) in edges {
+        let to = |i: usize| if i == b { a } else { i };
+        join(&mut graph.edges, to(p), to(q));
+    }
+    true
+}

@@ -1,0 +1,96 @@
+//! A symmetric character gets a symmetric cage.
+//!
+//! The plane looked for is x = middle of the bounding box, as characters are modelled. Where the skin
+//! is its own mirror image there, each section takes the image of its partner's corners, and a
+//! section on the plane is evened out. Inflation then keeps the vertices mirrored, whatever way faces
+//! across the plane are split. Linear in the samples and quadratic in the sections.
+
+use super::control_nodes::ControlNode;
+use super::sections::Section;
+use super::skin::Skin;
+use crate::points::Point;
+use rayon::prelude::*;
+
+/// How far a mirrored skin vertex may be from the skin, relative to the size.
+const TOLERANCE: f64 = 1e-3;
+
+fn image(p: &Point) -> Point {
+    Point::new(-p.x, p.y, p.z)
+}
+
+/// Whether the skin is its own mirror image in x.
+pub(crate) fn is_symmetric(skin: &Skin) -> bool {
+    let stride = (skin.points.len() / 500).max(1);
+    let samples: Vec<&Point> = skin.points.iter().step_by(stride).collect();
+    let near =
+        |p: &&Point| skin.tree.nearest(&skin.points, &image(p)).is_some_and(|n| n.distance < TOLERANCE);
+    samples.par_iter().all(near)
+}
+
+/// Makes the sections symmetric. For each corner its mirror image; `None`, and nothing changed, when
+/// some control node has no partner.
+pub(crate) fn symmetrise(nodes: &[ControlNode], sections: &mut [Section]) -> Option<Vec<u32>> {
+    let count = sections.first()?.corners.len();
+    let partner = |i: usize| {
+        let wanted = image(&sections[i].center);
+        let distance = |j: usize| (sections[j].center - wanted).norm();
+        let best = (0..sections.len()).min_by(|a, b| distance(*a).total_cmp(&distance(*b)))?;
+        (distance(best) < nodes[i].radius && nodes[best].kind == nodes[i].kind).then_some(best)
+    };
+    let partners: Vec<usize> = (0..sections.len()).map(partner).collect::<Option<_>>()?;
+    let mut mirror = vec![0; count * sections.len()];
+    let mut changed = sections.to_vec();
+    for (i, &j) in partners.iter().enumerate() {
+        if partners[j] != i {
+            return None;
+        }
+        if i == j {
+            let pairs = pair_up(&sections[i].corners)?;
+            for (k, &m) in pairs.iter().enumerate() {
+                mirror[i * count + k] = (i * count + m) as u32;
+                changed[i].corners[k] = (sections[i].corners[k] + image(&sections[i].corners[m])) * 0.5;
+            }
+        } else if i < j {
+            // A mirror image turns the other way, and so does a partner whose arc runs backward.
+            let along = image(&nodes[i].direction).dot(&nodes[j].direction) > 0.0;
+            for k in 0..count {
+                let m = if along { count - 1 - k } else { k };
+                changed[j].corners[m] = image(&sections[i].corners[k]);
+                mirror[i * count + k] = (j * count + m) as u32;
+                mirror[j * count + m] = (i * count + k) as u32;
+            }
+        }
+    }
+    for section in &mut changed {
+        section.center = section.corners.iter().sum::<Point>() / count as f64;
+    }
+    sections.clone_from_slice(&changed);
+    Some(mirror)
+}
+
+/// For each corner the one that its mirror image is nearest to; `None` when they don't pair up.
+fn pair_up(corners: &[Point]) -> Option<Vec<usize>> {
+    let n = corners.len();
+    // A reflection reverses the ring: corner k goes to s − k for one s.
+    let cost = |s: usize| {
+        (0..n).map(|k| (image(&corners[k]) - corners[(s + n - k) % n]).norm_squared()).sum::<f64>()
+    };
+    let flipped = (0..n).min_by(|a, b| cost(*a).total_cmp(&cost(*b)))?;
+    // A section in the plane itself stays as it is.
+    let flat: f64 = corners.iter().map(|p| 4.0 * p.x * p.x).sum();
+    Some((0..n).map(|k| if flat < cost(flipped) { k } else { (flipped + n - k) % n }).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_pair_up_across_the_plane_and_stay_within_it() {
+        let square = [(1.0, 1.0), (-1.1, 1.0), (-1.0, -1.0), (1.0, -0.9)].map(|(x, y)| Point::new(x, y, 0.0));
+        assert_eq!(pair_up(&square), Some(vec![1, 0, 3, 2]));
+        let within =
+            [(1.0, 1.0), (-1.1, 1.0), (-1.0, -1.0), (1.0, -0.9)].map(|(y, z)| Point::new(0.01, y, z));
+        assert_eq!(pair_up(&within), Some(vec![0, 1, 2, 3]));
+    }
+}

@@ -1,0 +1,329 @@
+//! From sections to a closed cage: tubes along arcs, hulls at branching nodes.
+//!
+//! [CLM*19 §7]. Two sections of an arc are joined by a strip of quads, in the rotation that brings
+//! their corners nearest; at a branching node the corners of its sections are projected to a sphere
+//! and joined by the convex hull there (exact predicates). A side of a section that the hull misses is
+//! put in by flips, where the paper adds Steiner points and removes them again: the same faces
+//! without the detour. The hull is star-shaped about its node, so it never crosses itself while
+//! sections are small. Linear in the sections.
+
+use super::control_nodes::{ControlNode, NodeKind};
+use super::sections::Section;
+use super::skeleton::CurveSkeleton;
+use crate::geometry::convex_hull::hull_on_sphere;
+use crate::geometry::predicates::side;
+use crate::points::Point;
+
+/// The faces of a cage and the axis inside it. Unit space.
+#[derive(Debug, Clone)]
+pub(crate) struct Scaffold {
+    /// Corners of the sections, node after node.
+    pub(crate) corners: Vec<Point>,
+    /// The control node of each corner.
+    pub(crate) owner: Vec<usize>,
+    /// Center of each control node's section.
+    pub(crate) centers: Vec<Point>,
+    /// Quads and triangles, outward.
+    pub(crate) polygons: Vec<Vec<u32>>,
+    /// A graph of straight lines inside: centers of sections, then of branching nodes.
+    pub(crate) axis: Axis,
+}
+
+/// A graph inside the cage.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Axis {
+    pub(crate) points: Vec<Point>,
+    pub(crate) edges: Vec<(usize, usize)>,
+}
+
+impl Scaffold {
+    /// The polygons split into triangles, quads along the diagonal that keeps them convex.
+    pub(crate) fn triangles(&self) -> Vec<[u32; 3]> {
+        self.polygons.iter().flat_map(|p| split(&self.corners, p)).collect()
+    }
+
+    /// Corners with their sections scaled about their centers.
+    pub(crate) fn scaled(&self, scale: f64) -> Vec<Point> {
+        let scaled = |(p, node): (&Point, &usize)| self.centers[*node] + (p - self.centers[*node]) * scale;
+        self.corners.iter().zip(&self.owner).map(scaled).collect()
+    }
+}
+
+/// Triangles of a polygon: a quad by its outward diagonal, others as a fan.
+pub(crate) fn split(points: &[Point], polygon: &[u32]) -> Vec<[u32; 3]> {
+    if let [a, b, c, d] = polygon[..] {
+        let [p, q, r, s] = [a, b, c, d].map(|v| &points[v as usize]);
+        let volume = (q - p).cross(&(r - p)).dot(&(s - p));
+        let size = (r - p).norm().max((s - q).norm()).powi(3);
+        // Flat: the shorter diagonal, so that no sliver comes of it.
+        let first = if volume.abs() < 1e-9 * size { (r - p).norm() <= (s - q).norm() } else { volume < 0.0 };
+        return if first { vec![[a, b, c], [a, c, d]] } else { vec![[b, c, d], [b, d, a]] };
+    }
+    (1..polygon.len() - 1).map(|k| [polygon[0], polygon[k], polygon[k + 1]]).collect()
+}
+
+/// Joins the sections. `scale`: about their centers, at which branches are to be star-shaped; else
+/// the junction that can't be is returned.
+pub(crate) fn scaffold(
+    skeleton: &CurveSkeleton,
+    nodes: &[ControlNode],
+    sections: &[Section],
+    scale: f64,
+) -> Result<Scaffold, usize> {
+    let count = sections.first().map_or(4, |s| s.corners.len());
+    let centers: Vec<Point> = sections.iter().map(|s| s.center).collect();
+    let mut built = Scaffold {
+        corners: sections.iter().flat_map(|s| s.corners.iter().copied()).collect(),
+        owner: (0..nodes.len()).flat_map(|n| vec![n; count]).collect(),
+        axis: Axis { points: centers.clone(), edges: Vec::new() },
+        centers,
+        polygons: Vec::new(),
+    };
+    let ring = |node: usize| -> Vec<u32> { (0..count).map(|k| (node * count + k) as u32).collect() };
+    let mut at_junction: Vec<Vec<(usize, bool)>> = vec![Vec::new(); skeleton.junctions.len()];
+    for (at, arc) in skeleton.arcs.iter().enumerate() {
+        let chain: Vec<usize> = (0..nodes.len()).filter(|n| nodes[*n].arc == at).collect();
+        for w in chain.windows(2) {
+            built.join(&ring(w[0]), &ring(w[1]));
+            built.axis.edges.push((w[0], w[1]));
+        }
+        for (side, node) in [(0, chain.first()), (1, chain.last())] {
+            let Some(&node) = node else { continue };
+            if nodes[node].kind == NodeKind::Leaf
+                && (side == 0 || chain.len() > 1)
+                && is_leaf_end(skeleton, at, side)
+            {
+                let mut cap = ring(node);
+                if side == 0 {
+                    cap.reverse();
+                }
+                built.polygons.push(cap);
+            } else {
+                at_junction[arc.ends[side]].push((node, side == 0));
+            }
+        }
+        // A leaf on its own on its arc closes one side and opens to the branching node on the other.
+        if let [node] = chain[..] {
+            for side in 0..2 {
+                if nodes[node].kind == NodeKind::Leaf && side == 1 && is_leaf_end(skeleton, at, 1) {
+                    at_junction[arc.ends[1]].retain(|(n, _)| *n != node);
+                    built.polygons.push(ring(node));
+                }
+            }
+        }
+    }
+    for (junction, members) in at_junction.iter().enumerate() {
+        if members.len() >= 2 {
+            let found = built.branch(&skeleton.junctions[junction].point, members, &ring, scale);
+            let center = found.ok_or(junction)?;
+            let at = built.axis.points.len();
+            built.axis.points.push(center);
+            built.axis.edges.extend(members.iter().map(|(node, _)| (*node, at)));
+        }
+    }
+    built.pull_leaves(nodes);
+    Ok(built)
+}
+
+fn is_leaf_end(skeleton: &CurveSkeleton, arc: usize, side: usize) -> bool {
+    skeleton.junctions[skeleton.arcs[arc].ends[side]].degree == 1
+}
+
+impl Scaffold {
+    /// A strip of quads from ring `a` to ring `b`.
+    fn join(&mut self, a: &[u32], b: &[u32]) {
+        let n = a.len();
+        let center = |r: &[u32]| r.iter().map(|v| self.corners[*v as usize]).sum::<Point>() / n as f64;
+        let shift = center(b) - center(a);
+        let cost = |turn: usize| -> f64 {
+            (0..n)
+                .map(|i| {
+                    let (p, q) = (self.corners[a[i] as usize], self.corners[b[(i + turn) % n] as usize]);
+                    (q - p - shift).norm_squared()
+                })
+                .sum()
+        };
+        let turn = (0..n).min_by(|x, y| cost(*x).total_cmp(&cost(*y))).unwrap_or(0);
+        for i in 0..n {
+            let j = (i + 1) % n;
+            self.polygons.push(vec![a[i], a[j], b[(j + turn) % n], b[(i + turn) % n]]);
+        }
+    }
+
+    /// The faces around a branching node; its center, moved until the sections surround it. `members`:
+    /// control nodes and whether their arc leads away from the branching node.
+    fn branch(
+        &mut self,
+        start: &Point,
+        members: &[(usize, bool)],
+        ring: &impl Fn(usize) -> Vec<u32>,
+        scale: f64,
+    ) -> Option<Point> {
+        let mean = members.iter().map(|(n, _)| self.centers[*n]).sum::<Point>() / members.len() as f64;
+        let rings: Vec<Vec<u32>> = members
+            .iter()
+            .map(|(node, away)| {
+                let mut ring = ring(*node);
+                if !away {
+                    ring.reverse();
+                }
+                ring
+            })
+            .collect();
+        for blend in [0.0, 0.15, 0.3, 0.5, 0.75, 1.0] {
+            let center = start + (mean - start) * blend;
+            if let Some(faces) = self.star(&center, members, &rings, scale) {
+                self.polygons.extend(faces);
+                return Some(center);
+            }
+        }
+        None
+    }
+
+    /// Faces between the rings that are star-shaped about `center`, sections scaled by `scale`.
+    fn star(
+        &self,
+        center: &Point,
+        members: &[(usize, bool)],
+        rings: &[Vec<u32>],
+        scale: f64,
+    ) -> Option<Vec<Vec<u32>>> {
+        let corner = |node: usize, v: u32| {
+            let p = self.centers[node] + (self.corners[v as usize] - self.centers[node]) * scale;
+            (p - center).try_normalize(1e-9)
+        };
+        let mut global = Vec::new();
+        let mut points = Vec::new();
+        let mut local: Vec<Vec<u32>> = Vec::new();
+        for ((node, _), ring) in members.iter().zip(rings) {
+            let first = points.len() as u32;
+            for v in ring {
+                points.push(corner(*node, *v)?);
+                global.push(*v);
+            }
+            local.push((first..points.len() as u32).collect());
+        }
+        let origin = Point::zeros();
+        let at = |v: u32| &points[v as usize];
+        // Each section must be seen from the center, convex and from behind.
+        for ring in &local {
+            let n = ring.len();
+            let convex =
+                (0..n).all(|i| side(at(ring[i]), at(ring[(i + 1) % n]), at(ring[(i + 2) % n]), &origin) > 0);
+            if !convex {
+                return None;
+            }
+        }
+        let mut faces = hull_on_sphere(&points)?;
+        if faces.iter().any(|f| side(at(f[0]), at(f[1]), at(f[2]), &origin) <= 0) {
+            return None;
+        }
+        for ring in &local {
+            for i in 0..ring.len() {
+                insert_edge(&points, &mut faces, ring[i], ring[(i + 1) % ring.len()])?;
+            }
+        }
+        let size = local[0].len() as u32;
+        let within = |f: &[u32; 3]| f[0] / size == f[1] / size && f[1] / size == f[2] / size;
+        let kept: Vec<[u32; 3]> = faces.iter().copied().filter(|f| !within(f)).collect();
+        let removed = faces.len() - kept.len();
+        if removed != local.len() * (size as usize - 2) {
+            return None;
+        }
+        Some(kept.iter().map(|f| f.iter().map(|v| global[*v as usize]).collect()).collect())
+    }
+
+    /// Leaf ends of the axis, drawn back from their caps.
+    fn pull_leaves(&mut self, nodes: &[ControlNode]) {
+        for (at, node) in nodes.iter().enumerate() {
+            let mut near = self.axis.edges.iter().filter(|(a, b)| *a == at || *b == at);
+            if let (NodeKind::Leaf, Some(&(a, b)), None) = (node.kind, near.next(), near.next()) {
+                let other = self.axis.points[if a == at { b } else { a }];
+                let leaf = self.axis.points[at];
+                self.axis.points[at] = leaf + (other - leaf) * 0.2;
+            }
+        }
+    }
+}
+
+/// Puts the edge `a` `b` into a triangulation of the sphere by flips. `None` when it can't be.
+fn insert_edge(points: &[Point], faces: &mut [[u32; 3]], a: u32, b: u32) -> Option<()> {
+    let origin = Point::zeros();
+    let at = |v: u32| &points[v as usize];
+    let crosses = |p: u32, q: u32, u: u32, v: u32| {
+        let s = side(&origin, at(p), at(q), at(u)) * side(&origin, at(p), at(q), at(v));
+        let t = side(&origin, at(u), at(v), at(p)) * side(&origin, at(u), at(v), at(q));
+        s < 0 && t < 0 && (at(p) + at(q)).dot(&(at(u) + at(v))) > 0.0
+    };
+    for round in 0..200_usize {
+        if faces.iter().any(|f| f.contains(&a) && f.contains(&b)) {
+            return Some(());
+        }
+        let mut flippable = Vec::new();
+        for (i, f) in faces.iter().enumerate() {
+            for k in 0..3 {
+                let (u, v, w) = (f[k], f[(k + 1) % 3], f[(k + 2) % 3]);
+                if u > v || [u, v].contains(&a) || [u, v].contains(&b) || !crosses(a, b, u, v) {
+                    continue;
+                }
+                let other = faces.iter().enumerate().find_map(|(j, g)| {
+                    (0..3).find(|m| g[*m] == v && g[(m + 1) % 3] == u).map(|m| (j, g[(m + 2) % 3]))
+                });
+                let (j, x) = other?;
+                if crosses(w, x, u, v) {
+                    flippable.push((i, j, [u, v, w, x]));
+                }
+            }
+        }
+        if flippable.is_empty() {
+            return None;
+        }
+        let (i, j, [u, v, w, x]) = flippable[round % flippable.len()];
+        faces[i] = [w, u, x];
+        faces[j] = [x, v, w];
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashMap;
+
+    fn quad(center: Point, direction: Point, width: f64) -> Section {
+        let (u, v) = super::super::sections::frame(&direction);
+        let corners: Vec<Point> = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
+            .iter()
+            .map(|(s, t)| center + u * (s * width) + v * (t * width))
+            .collect();
+        Section { ring: corners.clone(), corners, center }
+    }
+
+    #[test]
+    fn six_sections_around_a_node_close_with_every_side_in_two_faces() {
+        let ways = [Point::x(), -Point::x(), Point::y(), -Point::y(), Point::z(), -Point::z()];
+        let found: Vec<Section> = ways.iter().map(|d| quad(*d, *d, 0.4)).collect();
+        let mut built = Scaffold {
+            corners: found.iter().flat_map(|s| s.corners.clone()).collect(),
+            owner: (0..24).map(|v| v / 4).collect(),
+            centers: ways.to_vec(),
+            polygons: Vec::new(),
+            axis: Axis::default(),
+        };
+        let members: Vec<(usize, bool)> = (0..6).map(|n| (n, true)).collect();
+        let ring = |n: usize| (0..4).map(|k| (4 * n + k) as u32).collect::<Vec<u32>>();
+        assert!(built.branch(&Point::zeros(), &members, &ring, 0.9).is_some());
+        for n in 0..6 {
+            built.polygons.push(ring(n));
+        }
+        let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
+        for t in built.triangles() {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                *edges.entry((a.min(b), a.max(b))).or_default() += if a < b { 1 } else { -1 };
+            }
+        }
+        assert!(edges.values().all(|sum| *sum == 0));
+        assert_eq!(built.triangles().len(), 2 * 24 - 4);
+    }
+}

@@ -1,0 +1,154 @@
+//! The last word on a cage: exact, on the full meshes, in the numbers that are handed out.
+//!
+//! A cage is valid when it is closed, manifold and outward ([`Cage`] refuses what isn't), no two of
+//! its triangles touch beyond common corners, none touches the skin, and a point of each part of the
+//! skin is inside. Exact predicates behind boxes; `n log n`.
+
+use crate::cage::Cage;
+use crate::geometry::bvh::Bvh;
+use crate::geometry::intersections::{neighbours_touch, triangles_touch};
+use crate::mesh::Polygons;
+use crate::points::Point;
+use rayon::prelude::*;
+
+/// What is wrong with a cage, and at which of its vertices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Fault {
+    pub(crate) vertex: usize,
+    pub(crate) what: &'static str,
+}
+
+/// Checks a cage against a skin, both in one space. `None`: valid.
+pub(crate) fn fault(
+    cage: &[Point],
+    faces: &[[u32; 3]],
+    skin: &[Point],
+    triangles: &[[u32; 3]],
+) -> Option<Fault> {
+    let polygons = Polygons::from_triangles(faces);
+    match Cage::new(cage.to_vec(), &polygons) {
+        Err(_) => return Some(Fault { vertex: 0, what: "it is not a closed manifold" }),
+        Ok(cage) if cage.turned() => return Some(Fault { vertex: 0, what: "it is inside out" }),
+        Ok(_) => {}
+    }
+    if let Some(vertex) = first_self_crossing(cage, faces) {
+        return Some(Fault { vertex: vertex as usize, what: "it crosses itself" });
+    }
+    let tree = Bvh::new(cage, faces);
+    let vertex = first_outside(&tree, cage, skin, triangles)?;
+    Some(Fault { vertex: vertex as usize, what: "it does not enclose the skin" })
+}
+
+/// A vertex of the first pair of faces that touch.
+pub(crate) fn first_self_crossing(points: &[Point], faces: &[[u32; 3]]) -> Option<u32> {
+    let tree = Bvh::new(points, faces);
+    let crosses = |at: usize| {
+        let [a, b, c] = faces[at].map(|v| points[v as usize]);
+        let mut found = false;
+        tree.in_box(&a.inf(&b).inf(&c), &a.sup(&b).sup(&c), |other| {
+            found =
+                found || (other as usize > at && neighbours_touch(points, faces[at], faces[other as usize]));
+        });
+        found
+    };
+    (0..faces.len()).into_par_iter().find_first(|at| crosses(*at)).map(|at| faces[at][0])
+}
+
+/// A cage vertex near the first triangle of the skin that is not wholly inside the cage of `tree`.
+pub(crate) fn first_outside(
+    tree: &Bvh,
+    cage: &[Point],
+    skin: &[Point],
+    triangles: &[[u32; 3]],
+) -> Option<u32> {
+    let faces = tree.triangles();
+    let touches = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| &skin[v as usize]);
+        let mut found = None;
+        tree.in_box(&a.inf(b).inf(c), &a.sup(b).sup(c), |face| {
+            if found.is_none() && triangles_touch([a, b, c], faces[face as usize].map(|v| &cage[v as usize]))
+            {
+                found = Some(faces[face as usize][0]);
+            }
+        });
+        found
+    };
+    if let Some(found) = triangles.par_iter().find_map_first(touches) {
+        return Some(found);
+    }
+    // Nothing crosses: each connected part is inside or outside as a whole.
+    let mut root: Vec<u32> = (0..skin.len() as u32).collect();
+    fn find(root: &mut [u32], mut v: u32) -> u32 {
+        while root[v as usize] != v {
+            root[v as usize] = root[root[v as usize] as usize];
+            v = root[v as usize];
+        }
+        v
+    }
+    for t in triangles {
+        let a = find(&mut root, t[0]);
+        for v in &t[1..] {
+            let b = find(&mut root, *v);
+            root[b as usize] = a;
+        }
+    }
+    let mut parts: Vec<u32> = triangles.iter().map(|t| find(&mut root, t[0])).collect();
+    parts.sort_unstable();
+    parts.dedup();
+    let outside = parts.into_iter().find(|v| tree.winding(cage, &skin[*v as usize]) != 1)?;
+    let near = tree.nearest(cage, &skin[outside as usize])?;
+    Some(faces[near.triangle][0])
+}
+
+/// Whether a quad may also be split by its other diagonal. `pieces`: its two triangles.
+pub(crate) fn splits_either_way(
+    pieces: &[[u32; 3]],
+    cage: &[Point],
+    faces: &[[u32; 3]],
+    (skin, triangles): (&[Point], &[[u32; 3]]),
+    tree: &Bvh,
+) -> bool {
+    let [[a, b, c], [_, _, d]] = pieces else { return false };
+    let outer = [[*b, *c, *d], [*b, *d, *a]];
+    outer.iter().all(|t| {
+        let [p, q, r] = t.map(|v| &cage[v as usize]);
+        let apart = faces.iter().all(|f| {
+            let of_quad = f.iter().all(|v| [*a, *b, *c, *d].contains(v));
+            of_quad || !neighbours_touch(cage, *t, *f)
+        });
+        let mut clear = apart;
+        tree.in_box(&p.inf(q).inf(r), &p.sup(q).sup(r), |at| {
+            clear = clear && !triangles_touch([p, q, r], triangles[at as usize].map(|v| &skin[v as usize]));
+        });
+        clear
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::shapes::icosphere;
+
+    fn ball(radius: f64, shift: f64) -> (Vec<Point>, Vec<[u32; 3]>) {
+        let (points, triangles) = icosphere(1);
+        let points = points.iter().map(|p| p * radius + Point::x() * shift).collect();
+        (points, triangles.iter().map(|t| t.map(|v| v as u32)).collect())
+    }
+
+    #[test]
+    fn only_a_ball_around_the_ball_is_valid() {
+        let (skin, triangles) = ball(1.0, 0.0);
+        let check = |radius: f64, shift: f64| {
+            let (cage, faces) = ball(radius, shift);
+            fault(&cage, &faces, &skin, &triangles).map(|f| f.what)
+        };
+        assert_eq!(check(1.5, 0.0), None);
+        assert_eq!(check(1.5, 0.4), Some("it does not enclose the skin"));
+        assert_eq!(check(1.5, 9.0), Some("it does not enclose the skin"));
+        assert_eq!(check(0.5, 0.0), Some("it does not enclose the skin"));
+        assert_eq!(check(1.0, 0.0), Some("it does not enclose the skin"));
+        let (cage, mut faces) = ball(1.5, 0.0);
+        faces.iter_mut().for_each(|f| f.swap(0, 1));
+        assert_eq!(fault(&cage, &faces, &skin, &triangles).map(|f| f.what), Some("it is inside out"));
+    }
+}

@@ -1,0 +1,85 @@
+"""Cages generated from skins and skeletons, through the Python module."""
+
+import cage_rig_core as core
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def tube(square_tube):
+    """A closed bar of 30 rings and a straight skeleton in it."""
+    skin, faces = square_tube([(i / 3, 0.6 + 0.1 * np.sin(i)) for i in range(31)])
+    nodes = np.array([[0.5, 0, 0], [5.0, 0, 0], [9.5, 0, 0]])
+    return skin, faces, nodes, np.array([[0, 1], [1, 2]])
+
+
+def edges_of(triangles):
+    return np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+
+
+@pytest.mark.parametrize("placement", ["automatic", "joints"])
+def test_a_bar_is_caged(tube, placement):
+    vertices, faces, report = core.generate_cage(*tube, options={"placement": placement, "triangles": True})
+    assert len(vertices) == 4 * len(report["sections"])
+    assert len(faces) == 2 * len(vertices) - 4
+    assert report["genus"] == 0
+    assert report["clearance"] >= 1e-4
+    assert report["mirror"] is not None
+    assert not core.check_cage(vertices, faces)["turned"]
+    coords = core.mean_value_coordinates(tube[0], vertices, faces)
+    assert coords.min() > -0.3
+    image = vertices[report["mirror"]] * [-1, 1, 1] + [tube[0][:, 0].min() + tube[0][:, 0].max(), 0, 0]
+    assert np.abs(image - vertices).max() < 1e-6
+
+
+def test_given_bending_nodes_are_kept_and_quads_stay_quads(tube):
+    bending = np.array([[3.0, 0.1, 0], [5.0, 0, 0], [7.0, 0, -0.1]])
+    vertices, (corners, sizes), report = core.generate_cage(*tube, bending_nodes=bending)
+    assert [section["kind"] for section in report["sections"]] == ["leaf", "bending", "bending", "bending", "leaf"]
+    assert len(vertices) == 20
+    assert np.count_nonzero(sizes == 4) >= 4
+    assert sizes.sum() == len(corners)
+
+
+def test_sections_come_without_a_cage(tube):
+    sections = core.cage_sections(*tube, bending_nodes=[[5.0, 0, 0]])
+    middle = sections[1]
+    assert middle["kind"] == "bending"
+    assert middle["corners"].shape == (4, 3)
+    assert np.ptp(middle["corners"][:, 0]) < 0.3
+
+
+def test_progress_is_told_and_can_cancel(tube):
+    stages = []
+    core.generate_cage(*tube, progress=lambda stage, part: stages.append((stage, part)))
+    assert stages
+    assert all(0 <= part <= 1 for _, part in stages)
+    with pytest.raises(core.CagingError) as refused:
+        core.generate_cage(*tube, progress=lambda stage, part: False)
+    assert refused.value.cancelled
+
+    def fails(stage, part):
+        raise KeyError(stage)
+
+    with pytest.raises(KeyError):
+        core.generate_cage(*tube, progress=fails)
+
+
+def test_faults_name_their_place(tube):
+    skin, (corners, sizes), nodes, edges = tube
+    with pytest.raises(core.CagingError, match="open at edge") as refused:
+        core.generate_cage(skin, (corners[4:], sizes[1:]), nodes, edges)
+    assert refused.value.place is not None
+    with pytest.raises(core.CagingError, match="inside the skin"):
+        core.generate_cage(skin, (corners, sizes), nodes + [0, 50, 0], edges)
+    with pytest.raises(core.CagingError, match="no nodes"):
+        core.generate_cage(skin, (corners, sizes), np.zeros((0, 3)), np.zeros((0, 2), int))
+    with pytest.raises(core.CageRigError, match="no option named"):
+        core.generate_cage(skin, (corners, sizes), nodes, edges, options={"nope": 1})
+
+
+def test_an_inside_out_skin_is_turned(tube):
+    skin, (corners, sizes), nodes, edges = tube
+    turned = corners.reshape(-1, 4)[:, ::-1].ravel()
+    _, _, report = core.generate_cage(skin, (turned, sizes), nodes, edges)
+    assert report["repairs"]["inside_out"]
