@@ -17,6 +17,8 @@ use std::collections::BinaryHeap;
 const SWEEPS: usize = 350;
 /// Sweeps after the rings are let go, so that no edge between two rings jumps past their branching.
 const FREE_SWEEPS: usize = 200;
+/// Rounds of averaging around what still crosses the cage.
+const REPAIRS: usize = 24;
 
 /// Where inflation starts. Unit space.
 pub(crate) struct Start {
@@ -39,70 +41,114 @@ pub(crate) fn start(
     let faces = scaffold.triangles();
     let cage = scaffold.scaled(scale);
     if let Some(vertex) = verify::first_self_crossing(&cage, &faces) {
+        eprintln!("scale {scale}: cage crosses itself at section {}", scaffold.owner[vertex as usize]);
         return Err(vertex as usize);
     }
-    let places = places(scaffold, sections, points, triangles);
     let tree = Bvh::new(&cage, &faces);
+    let mut map = Map::new(scaffold, sections, points, triangles);
     let mut fault = 0;
-    for shrink in [0.1, 0.01, 0.001] {
-        let shrunk = |(p, q): (&Point, &Point)| q + (p - q) * (shrink * (2.0 * scale).min(1.0));
-        let obstacle: Vec<Point> = points.iter().zip(&places).map(shrunk).collect();
-        match verify::first_outside(&tree, &cage, &obstacle, triangles) {
-            None => return Ok(Start { scale, cage, obstacle }),
-            Some(vertex) => fault = vertex as usize,
-        }
+    for round in 0..REPAIRS {
+        let places = map.places();
+        let shrink = if round < REPAIRS / 2 { 0.03 } else { 0.003 } * (2.0 * scale).min(1.0);
+        let obstacle: Vec<Point> = points.iter().zip(&places).map(|(p, q)| q + (p - q) * shrink).collect();
+        let crossing = verify::crossing(&tree, &cage, &obstacle, triangles);
+        let Some((first, _)) = crossing.first() else {
+            return match verify::first_outside(&tree, &cage, &obstacle, triangles) {
+                None => Ok(Start { scale, cage, obstacle }),
+                Some(vertex) => Err(vertex as usize),
+            };
+        };
+        fault = *first as usize;
+        eprintln!(
+            "scale {scale} round {round}: {} cross, at section {}",
+            crossing.len(),
+            scaffold.owner[fault]
+        );
+        // Edges that jump too far: their surroundings are averaged on, with nothing held.
+        map.settle(crossing.iter().flat_map(|(_, t)| triangles[*t]));
     }
     Err(fault)
 }
 
-/// For each obstacle vertex, its place on the axis.
-fn places(scaffold: &Scaffold, sections: &[Section], points: &[Point], triangles: &[[u32; 3]]) -> Vec<Point> {
-    let graph = Samples::new(&scaffold.axis);
-    let tree = Bvh::new(points, triangles);
-    let mut fixed = vec![u32::MAX; points.len()];
-    for (node, section) in sections.iter().enumerate() {
-        for p in &section.ring {
-            if let Some(near) = tree.nearest(points, p) {
+/// A map of the obstacle's vertices into the axis graph.
+struct Map {
+    graph: Samples,
+    neighbours: Vec<Vec<u32>>,
+    at: Vec<u32>,
+    random: u64,
+}
+
+impl Map {
+    fn new(scaffold: &Scaffold, sections: &[Section], points: &[Point], triangles: &[[u32; 3]]) -> Self {
+        let tree = Bvh::new(points, triangles);
+        let mut fixed = vec![u32::MAX; points.len()];
+        for (node, section) in sections.iter().enumerate() {
+            for p in &section.ring {
+                let Some(near) = tree.nearest(points, p) else { continue };
+                let distance = |v: &u32| (points[*v as usize] - p).norm();
                 let corners = triangles[near.triangle];
-                let nearest = corners.iter().min_by(|a, b| {
-                    (points[**a as usize] - p).norm().total_cmp(&(points[**b as usize] - p).norm())
-                });
-                if let Some(v) = nearest {
+                if let Some(v) = corners.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) {
                     fixed[*v as usize] = node as u32;
                 }
             }
         }
+        let neighbours = neighbours(points.len(), triangles);
+        let at = spread(points, &neighbours, &fixed);
+        let graph = Samples::new(&scaffold.axis);
+        let mut map = Self { graph, neighbours, at, random: 0x2545_f491_4f6c_dd1d };
+        let loose: Vec<usize> = (0..points.len()).filter(|v| fixed[*v] == u32::MAX).collect();
+        map.average(&loose, SWEEPS);
+        let all: Vec<usize> = (0..points.len()).collect();
+        map.average(&all, FREE_SWEEPS);
+        map
     }
-    let neighbours = neighbours(points.len(), triangles);
-    let mut at = spread(points, &neighbours, &fixed);
-    let mut random = 0x2545_f491_4f6c_dd1d_u64;
-    let mut next = move |n: usize| {
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        ((random >> 33) as usize) % n
-    };
-    for sweep in 0..SWEEPS + FREE_SWEEPS {
-        for v in 0..points.len() {
-            let around = &neighbours[v];
-            if (fixed[v] == u32::MAX || sweep >= SWEEPS) && !around.is_empty() {
-                let other = at[around[next(around.len())] as usize];
-                at[v] = graph.middle(at[v], other);
+
+    /// Moves each of `vertices` halfway to a neighbour, along the graph, `sweeps` times.
+    fn average(&mut self, vertices: &[usize], sweeps: usize) {
+        for _ in 0..sweeps {
+            for &v in vertices {
+                let around = &self.neighbours[v];
+                if !around.is_empty() {
+                    self.random ^= self.random << 13;
+                    self.random ^= self.random >> 7;
+                    self.random ^= self.random << 17;
+                    let other = around[(self.random >> 33) as usize % around.len()];
+                    self.at[v] = self.graph.middle(self.at[v], self.at[other as usize]);
+                }
             }
         }
     }
-    // A last pass in space, over the noise of the random choices.
-    let mut smooth: Vec<Point> = at.iter().map(|s| graph.points[*s as usize]).collect();
-    for _ in 0..3 {
-        let old = smooth.clone();
-        for (v, around) in neighbours.iter().enumerate() {
-            let near =
-                around.iter().filter(|w| graph.distance(at[v], at[**w as usize]) < 2.5 * graph.spacing);
-            let (sum, count) = near.fold((old[v], 1.0), |(s, n), w| (s + old[*w as usize], n + 1.0));
-            smooth[v] = sum / count;
+
+    /// Averages around some vertices.
+    fn settle(&mut self, vertices: impl Iterator<Item = u32>) {
+        let mut near = vec![false; self.at.len()];
+        vertices.for_each(|v| near[v as usize] = true);
+        for _ in 0..4 {
+            let old = near.clone();
+            for (v, around) in self.neighbours.iter().enumerate() {
+                near[v] = old[v] || around.iter().any(|w| old[*w as usize]);
+            }
         }
+        let marked: Vec<usize> = (0..near.len()).filter(|v| near[*v]).collect();
+        self.average(&marked, 60);
     }
-    smooth
+
+    /// The places in space, with a last pass over the noise of the random choices.
+    fn places(&self) -> Vec<Point> {
+        let graph = &self.graph;
+        let mut smooth: Vec<Point> = self.at.iter().map(|s| graph.points[*s as usize]).collect();
+        for _ in 0..3 {
+            let old = smooth.clone();
+            for (v, around) in self.neighbours.iter().enumerate() {
+                let close =
+                    |w: &&u32| graph.distance(self.at[v], self.at[**w as usize]) < 2.5 * graph.spacing;
+                let near = around.iter().filter(close);
+                let (sum, count) = near.fold((old[v], 1.0), |(s, n), w| (s + old[*w as usize], n + 1.0));
+                smooth[v] = sum / count;
+            }
+        }
+        smooth
+    }
 }
 
 fn neighbours(count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {

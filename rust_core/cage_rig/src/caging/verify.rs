@@ -54,6 +54,28 @@ pub(crate) fn first_self_crossing(points: &[Point], faces: &[[u32; 3]]) -> Optio
     (0..faces.len()).into_par_iter().find_first(|at| crosses(*at)).map(|at| faces[at][0])
 }
 
+/// Triangles of the skin that touch the cage of `tree`, each with a cage vertex there.
+pub(crate) fn crossing(
+    tree: &Bvh,
+    cage: &[Point],
+    skin: &[Point],
+    triangles: &[[u32; 3]],
+) -> Vec<(u32, usize)> {
+    let faces = tree.triangles();
+    let touches = |(at, t): (usize, &[u32; 3])| {
+        let [a, b, c] = t.map(|v| &skin[v as usize]);
+        let mut found = None;
+        tree.in_box(&a.inf(b).inf(c), &a.sup(b).sup(c), |face| {
+            if found.is_none() && triangles_touch([a, b, c], faces[face as usize].map(|v| &cage[v as usize]))
+            {
+                found = Some((faces[face as usize][0], at));
+            }
+        });
+        found
+    };
+    triangles.par_iter().enumerate().filter_map(touches).collect()
+}
+
 /// A cage vertex near the first triangle of the skin that is not wholly inside the cage of `tree`.
 pub(crate) fn first_outside(
     tree: &Bvh,
@@ -61,20 +83,8 @@ pub(crate) fn first_outside(
     skin: &[Point],
     triangles: &[[u32; 3]],
 ) -> Option<u32> {
-    let faces = tree.triangles();
-    let touches = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|v| &skin[v as usize]);
-        let mut found = None;
-        tree.in_box(&a.inf(b).inf(c), &a.sup(b).sup(c), |face| {
-            if found.is_none() && triangles_touch([a, b, c], faces[face as usize].map(|v| &cage[v as usize]))
-            {
-                found = Some(faces[face as usize][0]);
-            }
-        });
-        found
-    };
-    if let Some(found) = triangles.par_iter().find_map_first(touches) {
-        return Some(found);
+    if let Some((vertex, _)) = crossing(tree, cage, skin, triangles).first() {
+        return Some(*vertex);
     }
     // Nothing crosses: each connected part is inside or outside as a whole.
     let mut root: Vec<u32> = (0..skin.len() as u32).collect();
@@ -97,7 +107,7 @@ pub(crate) fn first_outside(
     parts.dedup();
     let outside = parts.into_iter().find(|v| tree.winding(cage, &skin[*v as usize]) != 1)?;
     let near = tree.nearest(cage, &skin[outside as usize])?;
-    Some(faces[near.triangle][0])
+    Some(tree.triangles()[near.triangle][0])
 }
 
 /// Whether a quad may also be split by its other diagonal. `pieces`: its two triangles.
