@@ -132,6 +132,16 @@ def test_coordinates_and_skinning_know_nothing_above_them() -> None:
             assert not named & {other, "sync", "caging"}, path
 
 
+def test_nothing_below_knows_the_cage_generator() -> None:
+    for folder in ("coordinates", "skinning", "sync", "geometry"):
+        for path, named in uses(folder).items():
+            assert "caging" not in named, path
+    below = {"cage", "caging", "coordinates", "error", "fixtures", "geometry", "linalg", "mesh", "points", "rows"}
+    assert uses("caging")
+    for path, named in uses("caging").items():
+        assert named <= below, path
+
+
 def test_geometry_knows_neither_cages_nor_skeletons() -> None:
     assert uses("geometry")
     for path, named in uses("geometry").items():

@@ -41,7 +41,6 @@ pub(crate) fn start(
     let faces = scaffold.triangles();
     let cage = scaffold.scaled(scale);
     if let Some(vertex) = verify::first_self_crossing(&cage, &faces) {
-        eprintln!("scale {scale}: cage crosses itself at section {}", scaffold.owner[vertex as usize]);
         return Err(vertex as usize);
     }
     let tree = Bvh::new(&cage, &faces);
@@ -59,11 +58,6 @@ pub(crate) fn start(
             };
         };
         fault = *first as usize;
-        eprintln!(
-            "scale {scale} round {round}: {} cross, at section {}",
-            crossing.len(),
-            scaffold.owner[fault]
-        );
         // Edges that jump too far: their surroundings are averaged on, with nothing held.
         map.settle(crossing.iter().flat_map(|(_, t)| triangles[*t]));
     }

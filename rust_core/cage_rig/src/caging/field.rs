@@ -205,8 +205,14 @@ impl Window {
     /// Radius of the tube at the nearest skeleton point, minus the distance to it, largest over all.
     fn tube(&self, skeleton: &CurveSkeleton, radius: f64, cells: &[usize]) -> Vec<f64> {
         let middle = self.origin + Point::repeat(0.5 * (self.size - 1) as f64 * self.spacing);
+        // A control node beside the skeleton, or beyond its end, belongs to it.
+        let nearest = skeleton.arcs.iter().map(|arc| (arc, arc.nearest(&middle)));
+        let joint =
+            nearest.min_by(|a, b| a.1 .0.total_cmp(&b.1 .0)).map_or(middle, |(arc, (_, s))| arc.at(s));
         let reach = HALF * radius * 1.8;
-        let mut pieces = Vec::new();
+        let own = (TUBE * radius).max(1.2 * self.spacing);
+        let mut pieces =
+            vec![(joint, middle - joint, 1.0 / (middle - joint).norm_squared().max(1e-300), own, 0.0)];
         for arc in &skeleton.arcs {
             for k in 0..arc.path.len() - 1 {
                 let (a, b) = (arc.path[k], arc.path[k + 1]);

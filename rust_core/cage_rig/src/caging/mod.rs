@@ -170,7 +170,6 @@ impl Generator {
                 Ok(joined) => joined,
                 Err(junction) => {
                     let junction = &self.skeleton.junctions[junction];
-                    eprintln!("scale {scale}: no star at {:?}", junction.point);
                     let place = self.skin.space.leave(&junction.point);
                     fault = CagingError::NoStart { node: junction.node, place };
                     continue;
