@@ -249,6 +249,7 @@ class CagingOptions(TypedDict, total=False):
     tightness: float
     rounds: int  # of tightening
     triangles: bool  # instead of quads
+    detail: float  # leaves thinner than this, relative to the diagonal, get no branch
     asymmetric: bool  # leave a symmetric character's cage as it comes
 
 class Section(TypedDict):

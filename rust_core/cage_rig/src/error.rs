@@ -252,6 +252,14 @@ pub enum CagingError {
 }
 
 impl CagingError {
+    /// Whether skin and skeleton were sound and the cage in between failed.
+    pub(crate) fn is_of_growth(&self) -> bool {
+        matches!(
+            self,
+            Self::NoStart { .. } | Self::Stuck { .. } | Self::NotValid { .. } | Self::NoSection { .. }
+        )
+    }
+
     /// Where it is: the control or skeleton node, if one is meant, and a point in the skin's space.
     pub fn place(&self) -> (Option<usize>, Option<Point>) {
         match self {

@@ -169,7 +169,8 @@ fn report_dict<'py>(py: Python<'py>, report: &CageReport) -> PyResult<Bound<'py,
     Ok(found)
 }
 
-const OPTIONS: &str = "placement, grid, corners, reach, clearance, tightness, rounds, triangles, asymmetric";
+const OPTIONS: &str =
+    "placement, grid, corners, reach, clearance, tightness, rounds, triangles, detail, asymmetric";
 
 fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<CagingOptions> {
     let mut options = CagingOptions::default();
@@ -193,6 +194,7 @@ fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<CagingOptions> {
             "tightness" => options.inflation.tightness = value.extract()?,
             "rounds" => options.inflation.rounds = value.extract()?,
             "triangles" => options.triangles = value.extract()?,
+            "detail" => options.detail = value.extract()?,
             "asymmetric" => options.asymmetric = value.extract()?,
             unknown => {
                 let message = format!("there is no option named {unknown:?}; known: {OPTIONS}");

@@ -111,8 +111,8 @@ pub(crate) fn newton_step(shape: &Shape, points: &Points, contacts: &[Contact], 
         system.add(i, j, &-block);
         system.add(j, i, &-block);
     }
-    for i in 0..x.len() {
-        system.gradient[i] += (x[i] - shape.rest[i]) * w.anchor;
+    for (i, (p, rest)) in x.iter().zip(shape.rest).enumerate() {
+        system.gradient[i] += (p - rest) * w.anchor;
         system.add(i, i, &(Matrix3::identity() * (w.anchor + 1e-9)));
     }
     for t in shape.faces {

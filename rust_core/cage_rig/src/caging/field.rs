@@ -385,7 +385,7 @@ mod tests {
         let (vertices, faces) = square_tube(&rings);
         let skin = Skin::new(&vertices, &faces).expect("closed");
         let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
-        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]]).expect("inside");
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0).expect("inside");
         let center = skin.space.enter(&Point::new(5.0, 0.0, 0.0));
         let radius = 1.0 / skin.space.size;
         let field = Field::new(&skin, &skeleton, &center, radius, 48);

@@ -127,8 +127,8 @@ impl<'a> Inflation<'a> {
                 part * dt * far < 1e-3 * STEP
             };
             stalled = if slow { stalled + 1 } else { 0 };
-            if stalled > 25 {
-                if softened < 3 {
+            if stalled > 12 {
+                if softened < 2 {
                     softened += 1;
                     stalled = 0;
                     weights.shape *= 0.2;

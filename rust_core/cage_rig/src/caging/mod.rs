@@ -51,6 +51,8 @@ pub struct CagingOptions {
     pub inflation: InflationOptions,
     /// Triangles instead of quads.
     pub triangles: bool,
+    /// Leaves of the skeleton thinner than this (radius over the skin's diagonal) get no branch.
+    pub detail: f64,
     /// Leave a symmetric character's cage as it comes.
     pub asymmetric: bool,
 }
@@ -62,7 +64,14 @@ pub struct Generator {
     skeleton: CurveSkeleton,
     options: CagingOptions,
     original: (Vec<Point>, Vec<[u32; 3]>),
+    graph: (Vec<Point>, Vec<[i64; 2]>),
 }
+
+/// Control nodes, their sections, and for each corner its mirror image on a symmetric character.
+type CrossSections = (Vec<ControlNode>, Vec<Section>, Option<Vec<u32>>);
+
+/// When a cage fails with all leaves, leaves thinner than these are left out, one after the other.
+const COARSER: [f64; 2] = [0.005, 0.012];
 
 /// A valid cage.
 #[derive(Debug, Clone)]
@@ -86,9 +95,9 @@ impl Generator {
         options: CagingOptions,
     ) -> Result<Self, CagingError> {
         let skin = Skin::new(vertices, faces)?;
-        let skeleton = curve_skeleton(&skin, nodes, edges)?;
+        let skeleton = curve_skeleton(&skin, nodes, edges, options.detail)?;
         let original = (skin.original.clone(), skin.triangles.clone());
-        Ok(Self { skin, skeleton, options, original })
+        Ok(Self { skin, skeleton, options, original, graph: (nodes.to_vec(), edges.to_vec()) })
     }
 
     /// Control nodes and their cross sections; `bending`: the user's nodes, near the skeleton.
@@ -105,7 +114,7 @@ impl Generator {
         &self,
         bending: Option<&[Point]>,
         progress: &Progress,
-    ) -> Result<(Vec<ControlNode>, Vec<Section>, Option<Vec<u32>>), CagingError> {
+    ) -> Result<CrossSections, CagingError> {
         let nodes = control_nodes(&self.skin, &self.skeleton, bending, self.options.placement)?;
         let mut found =
             sections::sections(&self.skin, &self.skeleton, &nodes, &self.options.sections, progress)?;
@@ -114,12 +123,33 @@ impl Generator {
         Ok((nodes, found, mirror))
     }
 
-    /// The cage. `bending` as in [`Generator::sections`].
+    /// The cage. `bending` as in [`Generator::sections`]. Without it, thin leaves (fingers) that no
+    /// cage can be grown for are left out; the report names their nodes as dropped.
     pub fn generate(
         &self,
         bending: Option<&[Point]>,
         progress: &Progress,
     ) -> Result<GeneratedCage, CagingError> {
+        let first = self.attempt(bending, progress);
+        if !first.as_ref().is_err_and(|fault| bending.is_none() && fault.is_of_growth()) {
+            return first;
+        }
+        let mut arcs = self.skeleton.arcs.len();
+        for detail in COARSER {
+            let mut coarser = self.clone();
+            coarser.skeleton = curve_skeleton(&self.skin, &self.graph.0, &self.graph.1, detail)?;
+            if coarser.skeleton.arcs.len() < arcs {
+                arcs = coarser.skeleton.arcs.len();
+                match coarser.attempt(bending, progress) {
+                    Err(fault) if fault.is_of_growth() => {}
+                    found => return found,
+                }
+            }
+        }
+        first
+    }
+
+    fn attempt(&self, bending: Option<&[Point]>, progress: &Progress) -> Result<GeneratedCage, CagingError> {
         let mut clock = Clock::new();
         let (nodes, sections, mirror) = self.cross_sections(bending, progress)?;
         clock.lap("sections");

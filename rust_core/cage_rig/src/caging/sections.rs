@@ -215,7 +215,7 @@ mod tests {
         let (vertices, faces) = square_tube(&rings);
         let skin = Skin::new(&vertices, &faces).expect("closed");
         let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
-        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]]).expect("inside");
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0).expect("inside");
         let nodes = control_nodes(&skin, &skeleton, Some(&[Point::new(5.0, 0.3, 0.0)]), Placement::Joints);
         let nodes = nodes.expect("three");
         assert_eq!(nodes.len(), 3);

@@ -97,11 +97,13 @@ struct Graph {
     dropped: Vec<usize>,
 }
 
-/// Cleans the graph of `nodes` (`#N by 3`, the user's space) and `edges` and cuts it into arcs.
+/// Cleans the graph of `nodes` (`#N by 3`, the user's space) and `edges` and cuts it into arcs. Leaves
+/// thinner than `detail` (of the size) are left out.
 pub(crate) fn curve_skeleton(
     skin: &Skin,
     nodes: &[Point],
     edges: &[[i64; 2]],
+    detail: f64,
 ) -> Result<CurveSkeleton, CagingError> {
     let mut graph = read(skin, nodes, edges)?;
     clip(skin, &mut graph)?;
@@ -112,7 +114,7 @@ pub(crate) fn curve_skeleton(
         if skeleton.arcs.is_empty() {
             return Err(CagingError::SkeletonOutside);
         }
-        if !prune(skin, &mut graph, &skeleton) && !merge(&mut graph, &skeleton) {
+        if !prune(skin, &mut graph, &skeleton, detail) && !merge(&mut graph, &skeleton) {
             return Ok(skeleton);
         }
     }
@@ -324,7 +326,7 @@ fn arc(skin: &Skin, graph: &Graph, ends: [usize; 2], walk: &[usize]) -> Arc {
 }
 
 /// Removes one leaf arc that does not stick out. True when there was one.
-fn prune(skin: &Skin, graph: &mut Graph, skeleton: &CurveSkeleton) -> bool {
+fn prune(skin: &Skin, graph: &mut Graph, skeleton: &CurveSkeleton, detail: f64) -> bool {
     let mut leaves: Vec<(usize, usize, usize)> = Vec::new();
     for (k, arc) in skeleton.arcs.iter().enumerate() {
         for side in 0..2 {
@@ -339,7 +341,10 @@ fn prune(skin: &Skin, graph: &mut Graph, skeleton: &CurveSkeleton) -> bool {
     leaves.sort_by(|a, b| reach(a.1, a.2).total_cmp(&reach(b.1, b.2)).then(a.0.cmp(&b.0)));
     let hidden = |&(k, tip, base): &(usize, usize, usize)| {
         let (p, b) = (skeleton.junctions[tip].point, &skeleton.junctions[base]);
-        let short = reach(tip, base) < 1.4 * b.radius || skeleton.arcs[k].length() < 1e-2;
+        let mut radii = skeleton.arcs[k].radii.clone();
+        radii.sort_by(f64::total_cmp);
+        let thin = radii[radii.len() / 2] < detail;
+        let short = thin || reach(tip, base) < 1.4 * b.radius || skeleton.arcs[k].length() < 1e-2;
         let sibling = |&(other, far, at): &(usize, usize, usize)| {
             let q = skeleton.junctions[far].point;
             let ahead =

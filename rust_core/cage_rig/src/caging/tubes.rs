@@ -170,7 +170,7 @@ impl Scaffold {
                 ring
             })
             .collect();
-        for blend in [0.0, 0.15, 0.3, 0.5, 0.75, 1.0] {
+        for blend in [0.5, 0.25, 0.75, 0.0, 1.0] {
             let center = start + (mean - start) * blend;
             if let Some(faces) = self.star(&center, members, &rings, scale) {
                 self.polygons.extend(faces);
