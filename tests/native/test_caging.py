@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture
 def tube(square_tube):
     """A closed bar of 30 rings and a straight skeleton in it."""
-    skin, faces = square_tube([(i / 3, 0.6 + 0.1 * np.sin(i)) for i in range(31)])
+    skin, faces = square_tube([(i / 3, 0.6 + 0.1 * np.sin(abs(i - 15))) for i in range(31)])
     nodes = np.array([[0.5, 0, 0], [5.0, 0, 0], [9.5, 0, 0]])
     return skin, faces, nodes, np.array([[0, 1], [1, 2]])
 

@@ -117,7 +117,9 @@ impl<'a> Inflation<'a> {
                 obstacle.copy_from_slice(rest);
             }
             goal = target(t);
-            self.relax(&found, &obstacle, &goal, &weights, 3);
+            // Where shape and skin can't agree, the cage yields: its present shape is the rest shape.
+            let rest_shape = if softened > 0 { self.cage.clone() } else { goal.clone() };
+            self.relax(&found, &obstacle, &rest_shape, &weights, 3);
             if t >= 1.0 && weights.least >= 0.999 * least {
                 return Ok(Ok(()));
             }

@@ -5,7 +5,7 @@
 //! quadrant, the extreme ring point, and can take one twice (at toes); here the four are distinct, in
 //! cyclic order and spaced, chosen together. A window costs about 20 ms; windows run in parallel.
 
-use super::control_nodes::ControlNode;
+use super::control_nodes::{ControlNode, NodeKind};
 use super::field::Field;
 use super::progress::Progress;
 use super::skeleton::CurveSkeleton;
@@ -16,6 +16,8 @@ use rayon::prelude::*;
 
 /// Seeds on the circle.
 const SEEDS: usize = 20;
+/// Least mean half width of a leaf's section, in radii of its ball (which is 0.3 of the arc's).
+const BLUNT: f64 = 2.2;
 
 /// How finely sections are looked for.
 #[derive(Debug, Clone, Copy)]
@@ -82,8 +84,14 @@ pub(crate) fn section(
     if ring.len() < SEEDS / 2 {
         return None;
     }
-    let corners = corners(&ring, &node.direction, options.corners);
+    let mut corners = corners(&ring, &node.direction, options.corners);
     let center = corners.iter().sum::<Point>() / corners.len() as f64;
+    if node.kind == NodeKind::Leaf {
+        // Field lines close to a blunt end meet in its middle; the cage wants its width.
+        let width = corners.iter().map(|p| (p - center).norm()).sum::<f64>() / corners.len() as f64;
+        let scale = (BLUNT * node.radius / width.max(1e-300)).clamp(1.0, 5.0);
+        corners.iter_mut().for_each(|p| *p = center + (*p - center) * scale);
+    }
     Some(Section { ring, corners, center })
 }
 

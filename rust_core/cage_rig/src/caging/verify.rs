@@ -153,7 +153,7 @@ mod tests {
             fault(&cage, &faces, &skin, &triangles).map(|f| f.what)
         };
         assert_eq!(check(1.5, 0.0), None);
-        assert_eq!(check(1.5, 0.4), Some("it does not enclose the skin"));
+        assert_eq!(check(1.5, 0.7), Some("it does not enclose the skin"));
         assert_eq!(check(1.5, 9.0), Some("it does not enclose the skin"));
         assert_eq!(check(0.5, 0.0), Some("it does not enclose the skin"));
         assert_eq!(check(1.0, 0.0), Some("it does not enclose the skin"));
