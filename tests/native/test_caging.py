@@ -71,7 +71,7 @@ def test_faults_name_their_place(tube):
         core.generate_cage(skin, (corners[4:], sizes[1:]), nodes, edges)
     assert refused.value.place is not None
     with pytest.raises(core.CagingError, match="inside the skin"):
-        core.generate_cage(skin, (corners, sizes), nodes + [0, 50, 0], edges)
+        core.generate_cage(skin, (corners, sizes), np.add(nodes, [0, 50, 0]), edges)
     with pytest.raises(core.CagingError, match="no nodes"):
         core.generate_cage(skin, (corners, sizes), np.zeros((0, 3)), np.zeros((0, 2), int))
     with pytest.raises(core.CageRigError, match="no option named"):
