@@ -21,9 +21,11 @@ __all__ = [
     "ArrayError",
     "BindJob",
     "CageError",
+    "CageGenerator",
     "CageRigError",
     "Cancelled",
     "CagingError",
+    "CagingJob",
     "CoupledRig",
     "MethodJob",
     "PanicException",
@@ -35,6 +37,7 @@ __all__ = [
     "cage_sections",
     "check_cage",
     "coordinate_kinds",
+    "extract_skeleton",
     "generate_cage",
     "mean_value_coordinates",
     "skinning_methods",
@@ -301,3 +304,45 @@ def cage_sections(
     bending_nodes: ArrayLike | None = None,
     options: CagingOptions | None = None,
 ) -> list[Section]: ...
+def extract_skeleton(vertices: ArrayLike, faces: Faces) -> tuple[Doubles, NDArray[np.int64]]: ...  # nodes, edges
+@final
+class CagingJob:
+    """A cage generated in a thread of its own: takes what generate_cage takes, and begins at once."""
+
+    def __new__(
+        cls,
+        vertices: ArrayLike,
+        faces: Faces,
+        nodes: ArrayLike,
+        edges: ArrayLike,
+        *,
+        bending_nodes: ArrayLike | None = None,
+        options: CagingOptions | None = None,
+    ) -> CagingJob: ...
+    @property
+    def progress(self) -> float: ...  # 0 to 1, never falls
+    @property
+    def stage(self) -> str: ...
+    @property
+    def done(self) -> bool: ...
+    def cancel(self) -> None: ...
+    def wait(self, seconds: float | None = None) -> bool: ...
+    def result(
+        self,
+    ) -> tuple[Doubles, NDArray[np.int64] | tuple[NDArray[np.int64], NDArray[np.int64]], CagingReport]: ...
+
+@final
+class CageGenerator:
+    """A skin and its skeleton, kept: another call traces only the sections that its bending nodes changed."""
+
+    def __new__(
+        cls,
+        vertices: ArrayLike,
+        faces: Faces,
+        nodes: ArrayLike,
+        edges: ArrayLike,
+        *,
+        options: CagingOptions | None = None,
+    ) -> CageGenerator: ...
+    def sections(self, bending_nodes: ArrayLike | None = None) -> list[Section]: ...
+    def generate(self, bending_nodes: ArrayLike | None = None) -> CagingJob: ...

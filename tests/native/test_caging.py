@@ -65,6 +65,45 @@ def test_progress_is_told_and_can_cancel(tube):
         core.generate_cage(*tube, progress=fails)
 
 
+def test_a_job_generates_the_same_cage_in_a_thread_of_its_own(tube):
+    vertices, faces, report = core.generate_cage(*tube)
+    job = core.CagingJob(*tube)
+    found = job.result()
+    assert job.done
+    assert job.progress == 1
+    assert job.stage == "checking the cage"
+    assert np.array_equal(found[0], vertices)
+    assert np.array_equal(found[1][0], faces[0])
+    assert found[2]["volume_ratio"] == report["volume_ratio"]
+
+
+def test_a_cancelled_job_has_no_cage(tube):
+    job = core.CagingJob(*tube)
+    job.cancel()
+    with pytest.raises(core.Cancelled):
+        job.result()
+
+
+def test_a_kept_generator_answers_as_a_new_one(tube):
+    kept = core.CageGenerator(*tube)
+    for middle in (5.0, 5.5, 5.0):
+        bending = [[3.0, 0, 0], [middle, 0, 0]]
+        for found, fresh in zip(kept.sections(bending), core.cage_sections(*tube, bending_nodes=bending), strict=True):
+            assert np.array_equal(found["corners"], fresh["corners"])
+    vertices, _, _ = kept.generate([[3.0, 0, 0], [5.0, 0, 0]]).result()
+    fresh, _, _ = core.generate_cage(*tube, bending_nodes=[[3.0, 0, 0], [5.0, 0, 0]])
+    assert np.array_equal(vertices, fresh)
+
+
+def test_a_skin_without_an_armature_gets_a_skeleton(tube):
+    skin, faces, _, _ = tube
+    nodes, edges = core.extract_skeleton(skin, faces)
+    assert np.abs(nodes[:, 1:]).max() < 0.2
+    vertices, _, report = core.generate_cage(skin, faces, nodes, edges)
+    assert len(vertices) == 4 * len(report["sections"])
+    assert report["genus"] == 0
+
+
 def test_faults_name_their_place(tube):
     skin, (corners, sizes), nodes, edges = tube
     with pytest.raises(core.CagingError, match="open at edge") as refused:
@@ -76,6 +115,8 @@ def test_faults_name_their_place(tube):
         core.generate_cage(skin, (corners, sizes), np.zeros((0, 3)), np.zeros((0, 2), int))
     with pytest.raises(core.CageRigError, match="no option named"):
         core.generate_cage(skin, (corners, sizes), nodes, edges, options={"nope": 1})
+    with pytest.raises(core.CagingError, match="option corners is 2; it must be between 3 and 8"):
+        core.generate_cage(skin, (corners, sizes), nodes, edges, options={"corners": 2})
 
 
 def test_an_inside_out_skin_is_turned(tube):

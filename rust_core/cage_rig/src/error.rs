@@ -3,8 +3,8 @@
 //! One enum for each thing a user brings (cage, skin, weights, skeleton, pose). They are raised
 //! where input enters; an edit that returns one has changed nothing.
 
-use crate::progress::Cancelled;
 use crate::points::Point;
+use crate::progress::Cancelled;
 use thiserror::Error;
 
 /// Anything that can be wrong with what was handed in.
@@ -231,10 +231,6 @@ pub enum CagingError {
     BadEdge { edge: usize, node: i64, nodes: usize },
     #[error("no part of the skeleton is inside the skin")]
     SkeletonOutside,
-    #[error("the skeleton inside the skin is in {parts} parts; node {node}, near {}, is not connected to the rest", at(.place))]
-    SkeletonInParts { parts: usize, node: usize, place: Point },
-    #[error("a part of the skin near {} is not around the skeleton; join it to the rest or leave it out", at(.place))]
-    StrayPart { place: Point },
     #[error("bending node {row} has a coordinate that is not finite")]
     BendingNotFinite { row: usize },
     #[error("the skeleton is too short for a cage: it has {sections} cross sections and needs at least 2")]
@@ -247,8 +243,10 @@ pub enum CagingError {
     Stuck { node: usize, place: Point },
     #[error("the cage was refused by the final check near control node {node} at {}: {fault}; a bending node is needed there", at(.place))]
     NotValid { node: usize, place: Point, fault: &'static str },
-    #[error("cancelled")]
-    Cancelled,
+    #[error("option {name} is {value}; it must be between {low} and {high}")]
+    Option { name: &'static str, value: f64, low: f64, high: f64 },
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 impl CagingError {
@@ -266,12 +264,10 @@ impl CagingError {
             Self::NoSection { node, place }
             | Self::NoStart { node, place }
             | Self::Stuck { node, place }
-            | Self::NotValid { node, place, .. }
-            | Self::SkeletonInParts { node, place, .. } => (Some(*node), Some(*place)),
+            | Self::NotValid { node, place, .. } => (Some(*node), Some(*place)),
             Self::OpenSkin { place, .. }
             | Self::NonManifoldSkin { place, .. }
-            | Self::NotOrientable { place }
-            | Self::StrayPart { place } => (None, Some(*place)),
+            | Self::NotOrientable { place } => (None, Some(*place)),
             Self::NodeNotFinite { node } => (Some(*node), None),
             _ => (None, None),
         }

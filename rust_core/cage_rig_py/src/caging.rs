@@ -1,72 +1,167 @@
 //! Cages from skins and skeletons: `generate_cage` and its preview `cage_sections`.
 
 use crate::arrays;
-use crate::errors::{raise, CageRigError, OrRaise};
+use crate::errors::{cancelled, CageRigError, OrRaise};
+use crate::jobs::Job;
 use cage_rig::caging::{
-    CageReport, CagingOptions, GeneratedCage, Generator, NodeKind, Placement, Progress, SectionReport,
+    CageReport, CagingOptions, GeneratedCage, Generator, NodeKind, Placement, SectionReport,
 };
-use cage_rig::{CagingError, Point};
+use cage_rig::{CagingError, Error, Point, Polygons, Progress};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+
+/// Seconds between two looks at the work.
+const TELLING: f64 = 0.05;
 
 /// What Python hands in, read.
 struct Input {
-    generator: Generator,
-    bending: Option<Vec<Point>>,
+    vertices: Vec<Point>,
+    faces: Polygons,
+    nodes: Vec<Point>,
+    edges: Vec<[i64; 2]>,
+    options: CagingOptions,
 }
 
-/// Tells a Python callable about the progress, at most ten times a second, and keeps what it raised.
-struct Teller {
-    call: Option<Py<PyAny>>,
-    state: Mutex<(Option<Instant>, Option<PyErr>)>,
-}
-
-impl Teller {
-    fn tell(&self, stage: &'static str, part: f64) -> bool {
-        let Ok(mut state) = self.state.lock() else { return false };
-        if state.1.is_some() {
-            return false;
-        }
-        if state.0.is_some_and(|at| at.elapsed() < Duration::from_millis(100)) {
-            return true;
-        }
-        state.0 = Some(Instant::now());
-        let answer = Python::attach(|py| -> PyResult<bool> {
-            py.check_signals()?;
-            let Some(call) = &self.call else { return Ok(true) };
-            let answer = call.bind(py).call1((stage, part))?;
-            Ok(answer.is_none() || answer.is_truthy()?)
-        });
-        answer.unwrap_or_else(|error| {
-            state.1 = Some(error);
-            false
+impl Input {
+    fn read(
+        skin: [&Bound<'_, PyAny>; 2],
+        skeleton: [&Bound<'_, PyAny>; 2],
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            vertices: arrays::points(skin[0], "vertices", ("#V", None))?,
+            faces: arrays::polygons(skin[1], "faces")?,
+            nodes: arrays::points(skeleton[0], "nodes", ("#N", None))?,
+            edges: arrays::pairs(skeleton[1], "edges")?,
+            options: read_options(options)?,
         })
     }
 
-    fn raised(self, error: CagingError) -> PyErr {
-        let kept = self.state.into_inner().ok().and_then(|(_, raised)| raised);
-        kept.unwrap_or_else(|| raise(error))
+    fn generator(self) -> Result<Generator, CagingError> {
+        Generator::new(&self.vertices, &self.faces, &self.nodes, &self.edges, self.options)
     }
 }
 
-fn read(
-    py: Python<'_>,
-    skin: [&Bound<'_, PyAny>; 2],
-    skeleton: [&Bound<'_, PyAny>; 2],
-    bending: Option<&Bound<'_, PyAny>>,
-    options: Option<&Bound<'_, PyDict>>,
-) -> PyResult<Input> {
-    let vertices = arrays::points(skin[0], "vertices", ("#V", None))?;
-    let faces = arrays::polygons(skin[1], "faces")?;
-    let nodes = arrays::points(skeleton[0], "nodes", ("#N", None))?;
-    let edges = arrays::pairs(skeleton[1], "edges")?;
-    let bending = bending.map(|b| arrays::points(b, "bending_nodes", ("#B", None))).transpose()?;
-    let options = read_options(options)?;
-    let generator = py.detach(|| Generator::new(&vertices, &faces, &nodes, &edges, options)).or_raise()?;
-    Ok(Input { generator, bending })
+fn bending_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<Point>>> {
+    given.map(|b| arrays::points(b, "bending_nodes", ("#B", None))).transpose()
+}
+
+/// A cage generated in a thread of its own: takes what `generate_cage` takes, and begins at once.
+#[pyclass(frozen, module = "cage_rig_core")]
+pub(crate) struct CagingJob(Job<Arc<GeneratedCage>>);
+
+impl CagingJob {
+    fn start(
+        work: impl FnOnce(&Progress) -> Result<GeneratedCage, CagingError> + Send + 'static,
+    ) -> PyResult<Self> {
+        let work = move |progress: &Progress| {
+            work(progress).map_err(|fault| match fault {
+                CagingError::Cancelled(cancelled) => cancelled.into(),
+                fault => Error::from(fault),
+            })
+        };
+        Ok(Self(Job::start(work, Arc::new)?))
+    }
+}
+
+#[pymethods]
+impl CagingJob {
+    #[new]
+    #[pyo3(signature = (vertices, faces, nodes, edges, *, bending_nodes=None, options=None))]
+    fn new(
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        nodes: &Bound<'_, PyAny>,
+        edges: &Bound<'_, PyAny>,
+        bending_nodes: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let input = Input::read([vertices, faces], [nodes, edges], options)?;
+        let bending = bending_points(bending_nodes)?;
+        Self::start(move |progress| input.generator()?.generate(bending.as_deref(), &progress.whole()))
+    }
+
+    /// How much is done, 0 to 1. Never falls.
+    #[getter]
+    fn progress(&self) -> f64 {
+        self.0.share()
+    }
+
+    /// What is being computed, for people; empty before it begins.
+    #[getter]
+    fn stage(&self) -> &'static str {
+        self.0.stage()
+    }
+
+    /// Whether result() answers at once.
+    #[getter]
+    fn done(&self) -> bool {
+        self.0.is_done()
+    }
+
+    /// Stops it soon, unless it is done: then result() raises Cancelled.
+    fn cancel(&self, py: Python<'_>) {
+        self.0.cancel(py);
+    }
+
+    /// Waits until it is done, or for so many seconds; returns whether it is done.
+    #[pyo3(signature = (seconds=None))]
+    fn wait(&self, py: Python<'_>, seconds: Option<f64>) -> PyResult<bool> {
+        self.0.wait(py, seconds)
+    }
+
+    /// Vertices, faces and report as of generate_cage, once it is done; raises what that refuses.
+    fn result<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        cage_tuple(py, &*self.0.result(py)?)
+    }
+
+    fn __repr__(&self) -> String {
+        self.0.describe("CagingJob")
+    }
+}
+
+/// A skin and its skeleton, kept: another call traces only the sections that its bending nodes changed.
+#[pyclass(frozen, module = "cage_rig_core")]
+pub(crate) struct CageGenerator(Arc<Generator>);
+
+#[pymethods]
+impl CageGenerator {
+    #[new]
+    #[pyo3(signature = (vertices, faces, nodes, edges, *, options=None))]
+    fn new(
+        py: Python<'_>,
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        nodes: &Bound<'_, PyAny>,
+        edges: &Bound<'_, PyAny>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let input = Input::read([vertices, faces], [nodes, edges], options)?;
+        Ok(Self(Arc::new(py.detach(|| input.generator()).or_raise()?)))
+    }
+
+    /// As cage_sections.
+    #[pyo3(signature = (bending_nodes=None))]
+    fn sections<'py>(
+        &self,
+        py: Python<'py>,
+        bending_nodes: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyList>> {
+        let bending = bending_points(bending_nodes)?;
+        let found =
+            py.detach(|| self.0.sections(bending.as_deref(), &Progress::default().whole())).or_raise()?;
+        section_list(py, &found)
+    }
+
+    /// Begins the cage in a thread of its own.
+    #[pyo3(signature = (bending_nodes=None))]
+    fn generate(&self, bending_nodes: Option<&Bound<'_, PyAny>>) -> PyResult<CagingJob> {
+        let bending = bending_points(bending_nodes)?;
+        let generator = Arc::clone(&self.0);
+        CagingJob::start(move |progress| generator.generate(bending.as_deref(), &progress.whole()))
+    }
 }
 
 /// Builds a cage around a closed skin (vertices (#V, 3), faces) from its skeleton (nodes (#N, 3),
@@ -82,24 +177,34 @@ fn generate_cage<'py>(
     edges: &Bound<'py, PyAny>,
     bending_nodes: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
-    progress: Option<Py<PyAny>>,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let input = read(py, [vertices, faces], [nodes, edges], bending_nodes, options)?;
-    let teller = Teller { call: progress, state: Mutex::new((None, None)) };
-    let found = py.detach(|| {
-        let listener = |stage: &'static str, part: f64| teller.tell(stage, part);
-        input.generator.generate(input.bending.as_deref(), &Progress::new(&listener))
-    });
-    let GeneratedCage { vertices, faces, report } = found.map_err(|error| teller.raised(error))?;
+    let job = CagingJob::new(vertices, faces, nodes, edges, bending_nodes, options)?;
+    let mut told = None;
+    while !job.wait(py, progress.map(|_| TELLING))? {
+        let Some(call) = progress else { continue };
+        let news = (job.stage(), job.progress());
+        if !news.0.is_empty() && told.replace(news) != Some(news) {
+            let answer = call.call1(news)?;
+            if !answer.is_none() && !answer.is_truthy()? {
+                return Err(cancelled(py));
+            }
+        }
+    }
+    job.result(py)
+}
+
+fn cage_tuple<'py>(py: Python<'py>, found: &GeneratedCage) -> PyResult<Bound<'py, PyTuple>> {
+    let GeneratedCage { vertices, faces, report } = found;
     let sizes: Vec<i64> = faces.sizes.iter().map(|s| *s as i64).collect();
-    let corners = PyArray1::from_vec(py, faces.corners);
-    let vertices = arrays::from_points(py, &vertices)?;
+    let corners = PyArray1::from_slice(py, &faces.corners);
+    let vertices = arrays::from_points(py, vertices)?;
     if sizes.iter().all(|s| *s == 3) {
         let triangles = corners.reshape([sizes.len(), 3])?;
-        return (vertices, triangles, report_dict(py, &report)?).into_pyobject(py);
+        return (vertices, triangles, report_dict(py, report)?).into_pyobject(py);
     }
     let faces = (corners, PyArray1::from_vec(py, sizes));
-    (vertices, faces, report_dict(py, &report)?).into_pyobject(py)
+    (vertices, faces, report_dict(py, report)?).into_pyobject(py)
 }
 
 /// The cross sections that `generate_cage` would join, without the cage: a list of dictionaries.
@@ -114,10 +219,21 @@ fn cage_sections<'py>(
     bending_nodes: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let input = read(py, [vertices, faces], [nodes, edges], bending_nodes, options)?;
-    let found =
-        py.detach(|| input.generator.sections(input.bending.as_deref(), &Progress::silent())).or_raise()?;
-    section_list(py, &found)
+    CageGenerator::new(py, vertices, faces, nodes, edges, options)?.sections(py, bending_nodes)
+}
+
+/// A curve skeleton for a closed skin that has none: its nodes (#N, 3) and edges (#E, 2).
+#[pyfunction]
+fn extract_skeleton<'py>(
+    py: Python<'py>,
+    vertices: &Bound<'py, PyAny>,
+    faces: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let vertices = arrays::points(vertices, "vertices", ("#V", None))?;
+    let faces = arrays::polygons(faces, "faces")?;
+    let found = py.detach(|| cage_rig::caging::extract_skeleton(&vertices, &faces)).or_raise()?;
+    let edges = PyArray1::from_vec(py, found.edges.concat()).reshape([found.edges.len(), 2])?;
+    (arrays::from_points(py, &found.nodes)?, edges).into_pyobject(py)
 }
 
 fn section_list<'py>(py: Python<'py>, sections: &[SectionReport]) -> PyResult<Bound<'py, PyList>> {
@@ -206,6 +322,9 @@ fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<CagingOptions> {
 }
 
 pub(crate) fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<CagingJob>()?;
+    module.add_class::<CageGenerator>()?;
+    module.add_function(wrap_pyfunction!(extract_skeleton, module)?)?;
     module.add_function(wrap_pyfunction!(generate_cage, module)?)?;
     module.add_function(wrap_pyfunction!(cage_sections, module)?)
 }

@@ -54,10 +54,16 @@ fn caging_error(fault: &cage_rig::CagingError, message: String) -> PyErr {
     let named = Python::attach(|py| {
         let value = raised.value(py);
         value.setattr("node", node)?;
-        value.setattr("cancelled", matches!(fault, cage_rig::CagingError::Cancelled))?;
+        value.setattr("cancelled", matches!(fault, cage_rig::CagingError::Cancelled(_)))?;
         value.setattr("place", place.map(|p| (p.x, p.y, p.z)))
     });
     named.err().unwrap_or(raised)
+}
+
+/// What a progress callable that wants no more gets.
+pub(crate) fn cancelled(_py: Python<'_>) -> PyErr {
+    let fault = cage_rig::CagingError::from(cage_rig::Cancelled);
+    caging_error(&fault, fault.to_string())
 }
 
 /// `?` for the core's results.

@@ -60,11 +60,11 @@ impl<T> Shared<T> {
 }
 
 /// Work in a thread, or done already.
-struct Job<T>(Arc<Shared<T>>);
+pub(crate) struct Job<T>(Arc<Shared<T>>);
 
 impl<T: Clone + Send + 'static> Job<T> {
     /// Starts `work` in a thread. `keep` makes its result take effect, where it was not cancelled until then.
-    fn start<W: 'static>(
+    pub(crate) fn start<W: 'static>(
         work: impl FnOnce(&Progress) -> Result<W, Error> + Send + 'static,
         keep: impl FnOnce(W) -> T + Send + 'static,
     ) -> PyResult<Self> {
@@ -95,11 +95,11 @@ impl<T: Clone + Send + 'static> Job<T> {
         Self(Arc::new(Shared { progress, outcome: Mutex::new(outcome), done, ended }))
     }
 
-    fn is_done(&self) -> bool {
+    pub(crate) fn is_done(&self) -> bool {
         self.0.done.load(Relaxed)
     }
 
-    fn share(&self) -> f64 {
+    pub(crate) fn share(&self) -> f64 {
         let kept = || matches!(*self.0.outcome(), Some(Ok(_)));
         if self.is_done() && kept() {
             1.0
@@ -108,12 +108,12 @@ impl<T: Clone + Send + 'static> Job<T> {
         }
     }
 
-    fn stage(&self) -> &'static str {
+    pub(crate) fn stage(&self) -> &'static str {
         self.0.progress.stage()
     }
 
     /// Has no effect on what is done.
-    fn cancel(&self, py: Python<'_>) {
+    pub(crate) fn cancel(&self, py: Python<'_>) {
         py.detach(|| {
             let outcome = self.0.outcome();
             if outcome.is_none() {
@@ -123,7 +123,7 @@ impl<T: Clone + Send + 'static> Job<T> {
     }
 
     /// Waits until it is done, or for so many seconds; returns whether it is done.
-    fn wait(&self, py: Python<'_>, seconds: Option<f64>) -> PyResult<bool> {
+    pub(crate) fn wait(&self, py: Python<'_>, seconds: Option<f64>) -> PyResult<bool> {
         let limit = seconds.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
         let start = Instant::now();
         while !self.is_done() {
@@ -140,7 +140,7 @@ impl<T: Clone + Send + 'static> Job<T> {
         Ok(true)
     }
 
-    fn result(&self, py: Python<'_>) -> PyResult<T> {
+    pub(crate) fn result(&self, py: Python<'_>) -> PyResult<T> {
         loop {
             self.wait(py, None)?;
             if let Some(found) = self.0.outcome().clone() {
@@ -149,7 +149,7 @@ impl<T: Clone + Send + 'static> Job<T> {
         }
     }
 
-    fn describe(&self, what: &str) -> String {
+    pub(crate) fn describe(&self, what: &str) -> String {
         format!("<{what}: {:.0} %{}>", 100.0 * self.share(), if self.is_done() { ", done" } else { "" })
     }
 }

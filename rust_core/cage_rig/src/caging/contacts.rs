@@ -1,6 +1,7 @@
 //! Which features of a cage face which of the skin, or of the cage itself, across a small gap.
 //!
-//! Every vertex and edge belongs to one of its triangles, so that no gap is listed twice.
+//! Every vertex and edge belongs to one of its triangles, so that no gap is listed twice. The list is
+//! sorted by width: whoever knows how far things have moved since looks at its beginning only.
 
 use crate::geometry::bvh::Bvh;
 use crate::geometry::collision::{across, weights, width, Gap};
@@ -13,6 +14,13 @@ use std::collections::HashSet;
 pub(crate) struct Contact {
     pub(crate) gap: Gap,
     pub(crate) at: [u32; 4],
+    /// When it was found.
+    pub(crate) width: f64,
+}
+
+/// Those of a sorted list that were found narrower than `limit`.
+pub(crate) fn narrower(sorted: &[Contact], limit: f64) -> &[Contact] {
+    &sorted[..sorted.partition_point(|c| c.width < limit)]
 }
 
 /// A mesh whose features are told apart, with boxes around its triangles.
@@ -64,7 +72,8 @@ impl Points<'_> {
     }
 }
 
-/// All gaps narrower than `reach` that the cage has a part in. Trees must be fitted to `points`.
+/// All gaps narrower than `reach` that the cage has a part in, the narrowest first. Trees must be
+/// fitted to `points`.
 pub(crate) fn contacts(cage: &Body, obstacle: &Body, points: &Points, reach: f64) -> Vec<Contact> {
     let faces = cage.tree.triangles();
     let near = |at: usize| {
@@ -73,13 +82,24 @@ pub(crate) fn contacts(cage: &Body, obstacle: &Body, points: &Points, reach: f64
         with_itself(at, cage, points, reach, &mut found);
         found
     };
-    (0..faces.len()).into_par_iter().flat_map_iter(near).collect()
+    let mut found: Vec<Contact> = (0..faces.len()).into_par_iter().flat_map_iter(near).collect();
+    found.par_sort_by(|a, b| a.width.total_cmp(&b.width));
+    found
 }
 
-fn push(found: &mut Vec<Contact>, contact: Contact, points: &Points, reach: f64) {
-    if points.width(&contact) < reach {
+fn push(found: &mut Vec<Contact>, gap: Gap, at: [u32; 4], points: &Points, reach: f64) {
+    let mut contact = Contact { gap, at, width: 0.0 };
+    contact.width = points.width(&contact);
+    if contact.width < reach {
         found.push(contact);
     }
+}
+
+/// Whether the boxes of two groups of points are nearer than `reach`.
+fn close(a: &[Point], b: &[Point], reach: f64) -> bool {
+    let bounds = |x: &[Point]| x.iter().skip(1).fold((x[0], x[0]), |(l, h), p| (l.inf(p), h.sup(p)));
+    let ((l, h), (m, i)) = (bounds(a), bounds(b));
+    (m - h).sup(&(l - i)).sup(&Point::zeros()).norm_squared() < reach * reach
 }
 
 fn with_obstacle(
@@ -93,11 +113,17 @@ fn with_obstacle(
     let n = points.cage.len() as u32;
     let a = cage.tree.triangles()[at];
     let (own_corners, own_sides) = cage.owns[at];
-    let corners = a.map(|v| &points.cage[v as usize]);
-    obstacle.tree.near_triangle(corners, reach, |t| {
-        let b = obstacle.tree.triangles()[t as usize].map(|v| v + n);
+    let x = a.map(|v| points.cage[v as usize]);
+    let sides_of_face = [0, 1, 2].map(|k| [x[k], x[(k + 1) % 3]]);
+    obstacle.tree.near_triangle([&x[0], &x[1], &x[2]], reach, |t| {
+        let b = obstacle.tree.triangles()[t as usize];
+        let y = b.map(|v| points.obstacle[v as usize]);
+        if !close(&x, &y, reach) {
+            return;
+        }
+        let b = b.map(|v| v + n);
         let (corners, sides) = obstacle.owns[t as usize];
-        let mut add = |gap, at| push(found, Contact { gap, at }, points, reach);
+        let mut add = |gap, at| push(found, gap, at, points, reach);
         for k in 0..3 {
             if corners[k] {
                 add(Gap::PointTriangle, [b[k], a[0], a[1], a[2]]);
@@ -105,8 +131,11 @@ fn with_obstacle(
             if own_corners[k] {
                 add(Gap::PointTriangle, [a[k], b[0], b[1], b[2]]);
             }
+            if !own_sides[k] || !close(&sides_of_face[k], &y, reach) {
+                continue;
+            }
             for m in 0..3 {
-                if own_sides[k] && sides[m] {
+                if sides[m] {
                     add(Gap::EdgeEdge, [a[k], a[(k + 1) % 3], b[m], b[(m + 1) % 3]]);
                 }
             }
@@ -120,7 +149,7 @@ fn with_itself(at: usize, cage: &Body, points: &Points, reach: f64, found: &mut 
     cage.tree.near_triangle(a.map(|v| &points.cage[v as usize]), reach, |t| {
         let b = cage.tree.triangles()[t as usize];
         let (corners, sides) = cage.owns[t as usize];
-        let mut add = |gap, at| push(found, Contact { gap, at }, points, reach);
+        let mut add = |gap, at| push(found, gap, at, points, reach);
         for k in 0..3 {
             if corners[k] && !a.contains(&b[k]) {
                 add(Gap::PointTriangle, [b[k], a[0], a[1], a[2]]);

@@ -1,65 +1,67 @@
 //! A start without any crossing: the skin drawn into a thin thread along the cage's axis.
 //!
 //! Every skin vertex gets a place on the axis graph: vertices at the ring of a section that of its
-//! control node, the others by repeated averaging over neighbours with midpoints measured *along the
-//! graph* (a harmonic map into a graph; no chord across a concavity, loops and branchings included).
-//! The skin is scaled about its places on the axis until it is inside the cage, whose sections the
-//! caller scales about their centers until it is free of itself. About `600 · #vertices` table look-ups.
+//! control node, the others by averaging over neighbours with midpoints measured *along the graph* (a
+//! harmonic map into a graph; no chord across a concavity, loops and branchings included). Edges
+//! whose ends lie far apart on the graph are split, then the surroundings of every node of the
+//! graph drawn into it: after that each triangle lies along one straight line, inside the cage's tube
+//! around it. About `500 · #vertices` table look-ups.
 
+use super::axis_samples::Samples;
+use super::obstacle::Mesh;
 use super::sections::Section;
-use super::tubes::{Axis, Scaffold};
+use super::tubes::Scaffold;
 use super::verify;
 use crate::geometry::bvh::Bvh;
 use crate::points::Point;
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap};
 
-const SWEEPS: usize = 350;
-/// Sweeps after the rings are let go, so that no edge between two rings jumps past their branching.
-const FREE_SWEEPS: usize = 200;
-/// Rounds of averaging around what still crosses the cage.
-const REPAIRS: usize = 24;
+/// Sweeps of random averaging with the rings held.
+const SWEEPS: usize = 300;
+/// Sweeps of descent after the rings are let go.
+const FREE_SWEEPS: usize = 50;
+/// Rounds of splitting.
+const SPLITS: usize = 12;
+/// Edges end shorter than this part of the lines of the graph that they are on.
+const SHORT: f64 = 0.25;
+/// Distances of the contracted skin from the axis: of those at rest, and at most of the cage's rings.
+const THREADS: [(f64, f64); 3] = [(0.03, 0.25), (0.01, 0.05), (0.002, 0.01)];
 
 /// Where inflation starts. Unit space.
 pub(crate) struct Start {
-    /// Scale of the sections about their centers.
-    pub(crate) scale: f64,
     pub(crate) cage: Vec<Point>,
-    /// The contracted obstacle, inside the cage.
+    /// The obstacle at rest, some of its edges split.
+    pub(crate) rest: Mesh,
+    /// Its points contracted, inside the cage.
     pub(crate) obstacle: Vec<Point>,
 }
 
-/// Contracts the obstacle `points` with `triangles` into `scaffold` with its sections scaled by
-/// `scale`; else a cage vertex at the fault.
-pub(crate) fn start(
-    scaffold: &Scaffold,
-    sections: &[Section],
-    points: &[Point],
-    triangles: &[[u32; 3]],
-    scale: f64,
-) -> Result<Start, usize> {
+/// Contracts `obstacle` into the start of `scaffold`; else a cage vertex at the fault.
+pub(crate) fn start(scaffold: &Scaffold, sections: &[Section], obstacle: &Mesh) -> Result<Start, usize> {
     let faces = scaffold.triangles();
-    let cage = scaffold.scaled(scale);
+    let cage = scaffold.start.clone();
     if let Some(vertex) = verify::first_self_crossing(&cage, &faces) {
         return Err(vertex as usize);
     }
     let tree = Bvh::new(&cage, &faces);
-    let mut map = Map::new(scaffold, sections, points, triangles);
+    let mut map = Map::new(scaffold, sections, obstacle.clone());
+    map.split();
+    map.draw_in();
+    let places: Vec<Point> = map.at.iter().map(|s| map.graph.points[*s as usize]).collect();
     let mut fault = 0;
-    for round in 0..REPAIRS {
-        let places = map.places();
-        let shrink = if round < REPAIRS / 2 { 0.03 } else { 0.003 } * (2.0 * scale).min(1.0);
-        let obstacle: Vec<Point> = points.iter().zip(&places).map(|(p, q)| q + (p - q) * shrink).collect();
-        let crossing = verify::crossing(&tree, &cage, &obstacle, triangles);
-        let Some((first, _)) = crossing.first() else {
-            return match verify::first_outside(&tree, &cage, &obstacle, triangles) {
-                None => Ok(Start { scale, cage, obstacle }),
-                Some(vertex) => Err(vertex as usize),
-            };
-        };
-        fault = *first as usize;
-        // Edges that jump too far: their surroundings are averaged on, with nothing held.
-        map.settle(crossing.iter().flat_map(|(_, t)| triangles[*t]));
+    for (part, of_ring) in THREADS {
+        let thread: Vec<Point> = (0..places.len())
+            .map(|v| {
+                let out = map.mesh.points[v] - places[v];
+                let limit = of_ring * map.graph.width[map.at[v] as usize] / out.norm().max(1e-300);
+                places[v] + out * part.min(limit)
+            })
+            .collect();
+        match verify::first_outside(&tree, &cage, &thread, &map.mesh.triangles) {
+            None => return Ok(Start { cage, rest: map.mesh, obstacle: thread }),
+            Some(vertex) => fault = vertex as usize,
+        }
     }
     Err(fault)
 }
@@ -67,82 +69,121 @@ pub(crate) fn start(
 /// A map of the obstacle's vertices into the axis graph.
 struct Map {
     graph: Samples,
+    mesh: Mesh,
     neighbours: Vec<Vec<u32>>,
     at: Vec<u32>,
-    random: u64,
 }
 
 impl Map {
-    fn new(scaffold: &Scaffold, sections: &[Section], points: &[Point], triangles: &[[u32; 3]]) -> Self {
-        let tree = Bvh::new(points, triangles);
-        let mut fixed = vec![u32::MAX; points.len()];
+    fn new(scaffold: &Scaffold, sections: &[Section], mesh: Mesh) -> Self {
+        let tree = Bvh::new(&mesh.points, &mesh.triangles);
+        let mut fixed = vec![u32::MAX; mesh.points.len()];
         for (node, section) in sections.iter().enumerate() {
             for p in &section.ring {
-                let Some(near) = tree.nearest(points, p) else { continue };
-                let distance = |v: &u32| (points[*v as usize] - p).norm();
-                let corners = triangles[near.triangle];
+                let Some(near) = tree.nearest(&mesh.points, p) else { continue };
+                let distance = |v: &u32| (mesh.points[*v as usize] - p).norm();
+                let corners = mesh.triangles[near.triangle];
                 if let Some(v) = corners.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) {
                     fixed[*v as usize] = node as u32;
                 }
             }
         }
-        let neighbours = neighbours(points.len(), triangles);
-        let at = spread(points, &neighbours, &fixed);
-        let graph = Samples::new(&scaffold.axis);
-        let mut map = Self { graph, neighbours, at, random: 0x2545_f491_4f6c_dd1d };
-        let loose: Vec<usize> = (0..points.len()).filter(|v| fixed[*v] == u32::MAX).collect();
-        map.average(&loose, SWEEPS);
-        let all: Vec<usize> = (0..points.len()).collect();
-        map.average(&all, FREE_SWEEPS);
+        let graph = Samples::new(scaffold);
+        let neighbours = neighbours(mesh.points.len(), &mesh.triangles);
+        let at = spread(&graph, &mesh.points, &neighbours, &fixed);
+        let mut map = Self { graph, mesh, neighbours, at };
+        map.average(&fixed);
+        map.descend();
         map
     }
 
-    /// Moves each of `vertices` halfway to a neighbour, along the graph, `sweeps` times.
-    fn average(&mut self, vertices: &[usize], sweeps: usize) {
-        for _ in 0..sweeps {
-            for &v in vertices {
+    /// Moves vertices halfway to a random neighbour, along the graph.
+    fn average(&mut self, fixed: &[u32]) {
+        let mut random = 0x2545_f491_4f6c_dd1d_u64;
+        let loose = |v: &usize| fixed[*v] == u32::MAX && !self.neighbours[*v].is_empty();
+        let loose: Vec<usize> = (0..fixed.len()).filter(loose).collect();
+        for _ in 0..SWEEPS {
+            for &v in &loose {
+                random ^= random << 13;
+                random ^= random >> 7;
+                random ^= random << 17;
                 let around = &self.neighbours[v];
-                if !around.is_empty() {
-                    self.random ^= self.random << 13;
-                    self.random ^= self.random >> 7;
-                    self.random ^= self.random << 17;
-                    let other = around[(self.random >> 33) as usize % around.len()];
-                    self.at[v] = self.graph.middle(self.at[v], self.at[other as usize]);
+                let other = around[(random >> 33) as usize % around.len()];
+                self.at[v] = self.graph.middle(self.at[v], self.at[other as usize]);
+            }
+        }
+    }
+
+    /// Moves every vertex where its squared distances to its neighbours sum to less: no noise is left,
+    /// and no edge between two rings jumps past their branching.
+    fn descend(&mut self) {
+        for _ in 0..FREE_SWEEPS {
+            for (v, around) in self.neighbours.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
+                let cost = |s: u32| -> f64 {
+                    around.iter().map(|w| self.graph.distance(s, self.at[*w as usize]).powi(2)).sum()
+                };
+                let here = self.at[v];
+                let mut best = (cost(here) * (1.0 - 1e-9), here);
+                for &(next, _) in &self.graph.links[here as usize] {
+                    let found = cost(next as u32);
+                    if found < best.0 {
+                        best = (found, next as u32);
+                    }
+                }
+                self.at[v] = best.1;
+            }
+        }
+    }
+
+    /// Splits edges that are long on the graph.
+    fn split(&mut self) {
+        for _ in 0..SPLITS {
+            let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
+            for t in &self.mesh.triangles {
+                for (a, b) in sides(t) {
+                    let (p, q) = (self.at[a as usize], self.at[b as usize]);
+                    let middle = self.graph.middle(p, q);
+                    let room = [p, q, middle].map(|s| self.graph.room[s as usize]);
+                    let long = self.graph.distance(p, q) > SHORT * room[0].min(room[1]).min(room[2]);
+                    let key = (a.min(b), a.max(b));
+                    if long && middle != p && middle != q && !middles.contains_key(&key) {
+                        middles.insert(key, self.mesh.points.len() as u32);
+                        let place = (self.mesh.points[a as usize] + self.mesh.points[b as usize]) * 0.5;
+                        self.mesh.points.push(place);
+                        self.at.push(middle);
+                    }
+                }
+            }
+            if middles.is_empty() {
+                break;
+            }
+            self.mesh.split(&middles);
+        }
+    }
+
+    /// Draws the surroundings of every node of the graph into it, as far as edges across it reach.
+    fn draw_in(&mut self) {
+        let graph = &self.graph;
+        let mut reach = vec![0.0_f64; graph.nodes];
+        for t in &self.mesh.triangles {
+            for (a, b) in sides(t) {
+                let (p, q) = (self.at[a as usize], self.at[b as usize]);
+                let whole = graph.distance(p, q);
+                for (node, reach) in reach.iter_mut().enumerate() {
+                    let (d, e) = (graph.distance(p, node as u32), graph.distance(q, node as u32));
+                    if d + e <= whole * (1.0 + 1e-5) + 1e-9 {
+                        *reach = reach.max(d.max(e));
+                    }
                 }
             }
         }
+        let moved: Vec<u32> = self.at.iter().map(|s| graph.drawn_in(*s, &reach)).collect();
+        self.at = moved;
     }
+}
 
-    /// Averages around some vertices.
-    fn settle(&mut self, vertices: impl Iterator<Item = u32>) {
-        let mut near = vec![false; self.at.len()];
-        vertices.for_each(|v| near[v as usize] = true);
-        for _ in 0..4 {
-            let old = near.clone();
-            for (v, around) in self.neighbours.iter().enumerate() {
-                near[v] = old[v] || around.iter().any(|w| old[*w as usize]);
-            }
-        }
-        let marked: Vec<usize> = (0..near.len()).filter(|v| near[*v]).collect();
-        self.average(&marked, 60);
-    }
-
-    /// The places in space, with a last pass over the noise of the random choices.
-    fn places(&self) -> Vec<Point> {
-        let graph = &self.graph;
-        let mut smooth: Vec<Point> = self.at.iter().map(|s| graph.points[*s as usize]).collect();
-        for _ in 0..3 {
-            let old = smooth.clone();
-            for (v, around) in self.neighbours.iter().enumerate() {
-                let close =
-                    |w: &&u32| graph.distance(self.at[v], self.at[**w as usize]) < 2.5 * graph.spacing;
-                let near = around.iter().filter(close);
-                let (sum, count) = near.fold((old[v], 1.0), |(s, n), w| (s + old[*w as usize], n + 1.0));
-                smooth[v] = sum / count;
-            }
-        }
-        smooth
-    }
+fn sides(t: &[u32; 3]) -> [(u32, u32); 3] {
+    [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
 }
 
 fn neighbours(count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
@@ -155,9 +196,10 @@ fn neighbours(count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     found
 }
 
-/// The nearest fixed vertex's node for every vertex, by distance along edges.
-fn spread(points: &[Point], neighbours: &[Vec<u32>], fixed: &[u32]) -> Vec<u32> {
-    let mut at = vec![0; points.len()];
+/// The nearest fixed vertex's node for every vertex, by distance along edges; a part of the surface
+/// without any is at the place of the graph that is nearest to one of its vertices.
+fn spread(graph: &Samples, points: &[Point], neighbours: &[Vec<u32>], fixed: &[u32]) -> Vec<u32> {
+    let mut at = vec![u32::MAX; points.len()];
     let mut best = vec![f64::INFINITY; points.len()];
     let mut heap = BinaryHeap::new();
     for (v, node) in fixed.iter().enumerate().filter(|(_, n)| **n != u32::MAX) {
@@ -179,96 +221,47 @@ fn spread(points: &[Point], neighbours: &[Vec<u32>], fixed: &[u32]) -> Vec<u32> 
             }
         }
     }
+    for start in 0..at.len() {
+        if at[start] == u32::MAX {
+            let place = graph.nearest(&points[start]);
+            let mut stack = vec![start];
+            while let Some(v) = stack.pop() {
+                at[v] = place;
+                stack.extend(neighbours[v].iter().map(|w| *w as usize).filter(|w| at[*w] == u32::MAX));
+            }
+        }
+    }
     at
-}
-
-/// Points close together along a graph, with all distances and midpoints. The graph's own points
-/// come first.
-struct Samples {
-    points: Vec<Point>,
-    distances: Vec<f32>,
-    middles: Vec<u16>,
-    spacing: f64,
-}
-
-impl Samples {
-    fn new(axis: &Axis) -> Self {
-        let length: f64 = axis.edges.iter().map(|(a, b)| (axis.points[*a] - axis.points[*b]).norm()).sum();
-        let spacing = (length / 450.0).max(1e-4);
-        let mut points = axis.points.clone();
-        let mut links: Vec<Vec<(usize, f64)>> = vec![Vec::new(); points.len()];
-        for &(a, b) in &axis.edges {
-            let (p, q) = (axis.points[a], axis.points[b]);
-            let pieces = ((q - p).norm() / spacing).ceil().max(1.0) as usize;
-            let mut last = a;
-            for k in 1..=pieces {
-                let next = if k == pieces { b } else { points.len() };
-                if k < pieces {
-                    points.push(p + (q - p) * (k as f64 / pieces as f64));
-                    links.push(Vec::new());
-                }
-                let step = (points[next] - points[last]).norm();
-                links[last].push((next, step));
-                links[next].push((last, step));
-                last = next;
-            }
-        }
-        let n = points.len();
-        let (mut distances, mut middles) = (Vec::with_capacity(n * n), vec![0; n * n]);
-        for from in 0..n {
-            let (distance, before) = shortest(&links, from);
-            for to in 0..n {
-                let mut k = to;
-                while k != from && distance[k] > 0.5 * distance[to] + 1e-12 && distance[k].is_finite() {
-                    k = before[k];
-                }
-                middles[from * n + to] = k as u16;
-            }
-            distances.extend(distance.iter().map(|d| *d as f32));
-        }
-        Self { points, distances, middles, spacing }
-    }
-
-    fn middle(&self, a: u32, b: u32) -> u32 {
-        u32::from(self.middles[a as usize * self.points.len() + b as usize])
-    }
-
-    fn distance(&self, a: u32, b: u32) -> f64 {
-        f64::from(self.distances[a as usize * self.points.len() + b as usize])
-    }
-}
-
-fn shortest(links: &[Vec<(usize, f64)>], from: usize) -> (Vec<f64>, Vec<usize>) {
-    let mut distance = vec![f64::INFINITY; links.len()];
-    let mut before = vec![from; links.len()];
-    let mut heap = BinaryHeap::from([Reverse((0_u64, from))]);
-    distance[from] = 0.0;
-    while let Some(Reverse((bits, v))) = heap.pop() {
-        if f64::from_bits(bits) > distance[v] {
-            continue;
-        }
-        for &(w, step) in &links[v] {
-            let length = distance[v] + step;
-            if length < distance[w] {
-                distance[w] = length;
-                before[w] = v;
-                heap.push(Reverse((length.to_bits(), w)));
-            }
-        }
-    }
-    (distance, before)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::caging::control_nodes::{control_nodes, Placement};
+    use crate::caging::rings::Start as Rings;
+    use crate::caging::sections::tests::unwatched_sections;
+    use crate::caging::sections::{SectionOptions, Traced};
+    use crate::caging::skeleton::curve_skeleton;
+    use crate::caging::skin::Skin;
+    use crate::caging::tubes::scaffold;
+    use crate::fixtures::shapes::square_tube;
 
     #[test]
-    fn midpoints_are_measured_along_the_graph() {
-        let points = vec![Point::zeros(), Point::x(), Point::new(1.0, 1.0, 0.0), Point::y()];
-        let axis = Axis { points, edges: vec![(0, 1), (1, 2), (2, 3)] };
-        let graph = Samples::new(&axis);
-        let middle = graph.points[graph.middle(0, 3) as usize];
-        assert!((middle - Point::new(1.0, 0.5, 0.0)).norm() < 0.02, "{middle}");
+    fn a_coarse_bar_becomes_a_thread_inside_small_rings() {
+        // Two rings only: every side is one long face, which has to be split to follow the axis.
+        let (vertices, faces) = square_tube(&[(0.0, 1.0), (10.0, 1.0)]);
+        let skin = Skin::new(&vertices, &faces).expect("closed");
+        let bones = [Point::new(1.0, 0.0, 0.0), Point::new(5.0, 0.5, 0.0), Point::new(9.0, 0.0, 0.0)];
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1], [1, 2]], 0.0, &[]).expect("inside");
+        let nodes = control_nodes(&skin, &skeleton, Some(&[bones[1]]), Placement::Joints).expect("three");
+        let options = SectionOptions::default();
+        let found = unwatched_sections(&Traced::default(), &skin, &skeleton, &nodes, &options);
+        let small = Rings::Regular(0.1).corners(&nodes, &found);
+        let built = scaffold(&skeleton, &nodes, &found, small).expect("no branches");
+        let mesh = Mesh { points: skin.points.clone(), triangles: skin.triangles.clone() };
+        let begun = start(&built, &found, &mesh).expect("a start");
+        assert!(begun.rest.triangles.len() > mesh.triangles.len());
+        let tree = Bvh::new(&begun.cage, &built.triangles());
+        assert_eq!(verify::first_outside(&tree, &begun.cage, &begun.obstacle, &begun.rest.triangles), None);
     }
 }

@@ -31,6 +31,9 @@ const BARRIER: f64 = 20.0;
 /// cap of 10 degrees has 0.2 to 0.3.
 const FLAT: f64 = 0.34;
 
+/// Gaps this narrow, relative to the reach, are pushed open faster than Newton's method would.
+const TINY: f64 = 0.1;
+
 /// The cage's connectivity and rest shape.
 pub(crate) struct Shape<'a> {
     pub(crate) faces: &'a [[u32; 3]],
@@ -40,13 +43,17 @@ pub(crate) struct Shape<'a> {
     pub(crate) mirror: Option<&'a [u32]>,
 }
 
-/// Value, first and second derivative of the barrier at width `d` over the least.
+/// Value, first and, where it is not tiny, second derivative of the barrier at width `d` over the
+/// least.
 fn barrier(d: f64, reach: f64) -> (f64, f64, f64) {
     if d >= reach {
         return (0.0, 0.0, 0.0);
     }
     let (ln, q) = ((d / reach).ln(), d - reach);
-    (-q * q * ln, -2.0 * q * ln - q * q / d, -2.0 * ln - 4.0 * q / d + q * q / (d * d))
+    let slope = -2.0 * q * ln - q * q / d;
+    // The true curvature would open a tiny gap by no more than its own width a step.
+    let curvature = (-2.0 * ln - 4.0 * q / d + q * q / (d * d)).min(-slope / (TINY * reach));
+    (-q * q * ln, slope, curvature.max(0.0))
 }
 
 /// Quality of a triangle and its gradient at each corner.

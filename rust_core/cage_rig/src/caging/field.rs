@@ -209,19 +209,13 @@ impl Window {
         let nearest = skeleton.arcs.iter().map(|arc| (arc, arc.nearest(&middle)));
         let joint =
             nearest.min_by(|a, b| a.1 .0.total_cmp(&b.1 .0)).map_or(middle, |(arc, (_, s))| arc.at(s));
-        let reach = HALF * radius * 1.8;
         let own = (TUBE * radius).max(1.2 * self.spacing);
         let mut pieces =
             vec![(joint, middle - joint, 1.0 / (middle - joint).norm_squared().max(1e-300), own, 0.0)];
-        for arc in &skeleton.arcs {
-            for k in 0..arc.path.len() - 1 {
-                let (a, b) = (arc.path[k], arc.path[k + 1]);
-                if ((a + b) * 0.5 - middle).norm() < reach + (b - a).norm() {
-                    let least = 1.2 * self.spacing;
-                    let (r, s) = ((TUBE * arc.radii[k]).max(least), (TUBE * arc.radii[k + 1]).max(least));
-                    pieces.push((a, b - a, 1.0 / (b - a).norm_squared().max(1e-300), r, s - r));
-                }
-            }
+        let least = 1.2 * self.spacing;
+        for (a, b, radii) in near(skeleton, &middle, radius) {
+            let [r, s] = radii.map(|r| (TUBE * r).max(least));
+            pieces.push((a, b - a, 1.0 / (b - a).norm_squared().max(1e-300), r, s - r));
         }
         cells
             .iter()
@@ -306,6 +300,19 @@ impl Window {
     }
 }
 
+/// Pieces of the skeleton, with the radii at their ends, that reach into the window around `center`.
+pub(crate) fn near<'a>(
+    skeleton: &'a CurveSkeleton,
+    center: &'a Point,
+    radius: f64,
+) -> impl Iterator<Item = (Point, Point, [f64; 2])> + 'a {
+    let reach = HALF * radius * 1.8;
+    let pieces = skeleton.arcs.iter().flat_map(|arc| {
+        (0..arc.path.len() - 1).map(|k| (arc.path[k], arc.path[k + 1], [arc.radii[k], arc.radii[k + 1]]))
+    });
+    pieces.filter(move |(a, b, _)| ((a + b) * 0.5 - center).norm() < reach + (b - a).norm())
+}
+
 /// What lies beyond a cell.
 enum Step {
     /// The end of the window: nothing flows through it.
@@ -385,7 +392,7 @@ mod tests {
         let (vertices, faces) = square_tube(&rings);
         let skin = Skin::new(&vertices, &faces).expect("closed");
         let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
-        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0).expect("inside");
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0, &[]).expect("inside");
         let center = skin.space.enter(&Point::new(5.0, 0.0, 0.0));
         let radius = 1.0 / skin.space.size;
         let field = Field::new(&skin, &skeleton, &center, radius, 48);

@@ -5,14 +5,13 @@
 //! Newton steps under a barrier. At the end pressure draws it tight around the resting skin. Cost:
 //! about a hundred steps, each linear in the gaps narrower than a few per cent of the size.
 
-use super::contacts::{contacts, Body, Contact, Points};
+use super::contacts::{contacts, narrower, Body, Contact, Points};
 use super::contraction::Start;
 use super::energy::{energy, newton_step, Shape, Weights};
-use super::progress::Progress;
 use super::tubes::Scaffold;
-use crate::error::CagingError;
 use crate::geometry::collision::free_part;
 use crate::points::Point;
+use crate::progress::{Cancelled, Part};
 use rayon::prelude::*;
 
 /// Limits of inflation; lengths relative to the bounding diagonal of the skin.
@@ -36,6 +35,10 @@ impl Default for InflationOptions {
 
 /// The farthest anything moves in one step.
 const STEP: f64 = 3e-3;
+
+/// Gaps narrower than this part of the reach make the skin wait, so many times in a row.
+const PRESSED: f64 = 0.02;
+const WAITS: usize = 4;
 
 /// A cage in the middle of its growth.
 pub(crate) struct Inflation<'a> {
@@ -65,20 +68,20 @@ impl<'a> Inflation<'a> {
         Self { scaffold, faces, edges, mirror, cage, body }
     }
 
-    /// Grows from `start` around the obstacle `rest` with `triangles`, to a gap of `least`.
+    /// Grows from `start` around its obstacle at rest, to a gap of `least`.
     pub(crate) fn grow(
         &mut self,
         start: Start,
-        (rest, triangles): (&[Point], &[[u32; 3]]),
         options: &InflationOptions,
         least: f64,
-        progress: &Progress,
-    ) -> Result<Result<(), Halt>, CagingError> {
+        progress: &Part,
+    ) -> Result<Result<(), Halt>, Cancelled> {
         let mut obstacle = start.obstacle;
+        let (rest, triangles) = (&start.rest.points, &start.rest.triangles);
         let mut body = Body::new(&obstacle, triangles);
         let ways: Vec<Point> = rest.iter().zip(&obstacle).map(|(p, q)| p - q).collect();
         let far = ways.iter().map(|w| w.norm()).fold(1e-12, f64::max);
-        let target = |t: f64| self.scaffold.scaled(start.scale + (1.05 - start.scale) * t);
+        let target = |t: f64| self.scaffold.grown(t);
         let mut weights = Weights {
             shape: 1.0,
             anchor: 0.02,
@@ -87,10 +90,10 @@ impl<'a> Inflation<'a> {
             reach: options.reach,
             least: 0.0,
         };
-        let (mut t, mut stalled, mut softened) = (0.0_f64, 0, 0);
+        let (mut t, mut stalled, mut softened, mut waited) = (0.0_f64, 0, 0, 0);
         let mut goal = target(0.0);
         for _ in 0..1500 {
-            progress.step("inflation", 0.9 * t)?;
+            progress.reach(t)?;
             let dt = (STEP / far).min(1.0 - t);
             let wanted = target(t + dt);
             let mut moves: Vec<Point> = wanted.iter().zip(&goal).map(|(p, q)| p - q).collect();
@@ -98,17 +101,30 @@ impl<'a> Inflation<'a> {
             moves.iter_mut().for_each(|m| *m *= (STEP / longest).min(1.0));
             self.body.tree.refit(&self.cage);
             body.tree.refit(&obstacle);
-            let points = Points { cage: &self.cage, obstacle: &obstacle };
-            let found = contacts(&self.body, &body, &points, weights.reach + least + 4.0 * STEP);
-            let narrowest = found.par_iter().map(|c| points.width(c)).reduce(|| f64::INFINITY, f64::min);
-            weights.least = least.min(weights.least + 0.5 * (narrowest - weights.least).max(0.0));
+            let mut around = Surroundings::of(
+                &self.body,
+                &body,
+                &self.cage,
+                &obstacle,
+                weights.reach + least + 4.0 * STEP,
+            );
+            let narrowest = around.narrowest();
+            // While it grows, half of every gap is free to be used.
+            let wished = if t < 1.0 { 0.5 * narrowest } else { 0.5 * (narrowest + weights.least) };
+            weights.least = least.min(wished.max(weights.least));
+            // A barrier pushes a gap open by a few times its width: the skin waits for a cage that is pressed.
+            let pressed = narrowest - weights.least < PRESSED * weights.reach && waited < WAITS;
+            waited = if pressed { waited + 1 } else { 0 };
+            let dt = if pressed { 0.0 } else { dt };
             let steps: Vec<Point> = ways.iter().map(|w| w * dt).collect();
-            let mut part = self.free(&found, &points, Some(&moves), Some(&steps), weights.least);
+            let points = Points { cage: &self.cage, obstacle: &obstacle };
+            let mut part = around.free(&points, Some(&moves), Some(&steps), weights.least);
             if part < 0.05 {
                 // The cage's own way may be what blocks: it stays then.
                 moves.iter_mut().for_each(|m| *m = Point::zeros());
-                part = self.free(&found, &points, None, Some(&steps), weights.least);
+                part = around.free(&points, None, Some(&steps), weights.least);
             }
+            around.moved += part * relative(Some(&moves), Some(&steps));
             self.cage.iter_mut().zip(&moves).for_each(|(p, m)| *p += m * part);
             obstacle.iter_mut().zip(&steps).for_each(|(p, m)| *p += m * part);
             t += dt * part;
@@ -119,14 +135,14 @@ impl<'a> Inflation<'a> {
             goal = target(t);
             // Where shape and skin can't agree, the cage yields: its present shape is the rest shape.
             let rest_shape = if softened > 0 { self.cage.clone() } else { goal.clone() };
-            self.relax(&found, &obstacle, &rest_shape, &weights, 3);
+            self.relax(&mut around, &obstacle, &rest_shape, &weights, if pressed { 6 } else { 3 });
             if t >= 1.0 && weights.least >= 0.999 * least {
                 return Ok(Ok(()));
             }
             let slow = if t >= 1.0 {
                 weights.least < 0.5 * least && narrowest < 2.0 * weights.least
             } else {
-                part * dt * far < 1e-3 * STEP
+                !pressed && part * dt * far < 1e-3 * STEP
             };
             stalled = if slow { stalled + 1 } else { 0 };
             if stalled > 12 {
@@ -138,7 +154,7 @@ impl<'a> Inflation<'a> {
                     weights.reach *= 0.6;
                     continue;
                 }
-                return Ok(Err(self.halt(&obstacle, &found)));
+                return Ok(Err(self.halt(&obstacle, &around.found)));
             }
         }
         Ok(Err(self.halt(&obstacle, &[])))
@@ -156,27 +172,26 @@ impl<'a> Inflation<'a> {
         &mut self,
         (rest, triangles): (&[Point], &[[u32; 3]]),
         options: &InflationOptions,
-        progress: &Progress,
-    ) -> Result<(), CagingError> {
+        progress: &Part,
+    ) -> Result<(), Cancelled> {
         let body = Body::new(rest, triangles);
         let mut reach = options.reach;
         let mut stiffness = 0.3;
         for round in 0..options.rounds {
-            progress.step("inflation", 0.9 + 0.1 * round as f64 / options.rounds as f64)?;
+            progress.reach(round as f64 / options.rounds as f64)?;
             self.body.tree.refit(&self.cage);
-            let points = Points { cage: &self.cage, obstacle: rest };
-            let found = contacts(&self.body, &body, &points, reach + options.clearance + 2.0 * STEP);
-            let narrowest = found.par_iter().map(|c| points.width(c)).reduce(|| f64::INFINITY, f64::min);
+            let reached = reach + options.clearance + 2.0 * STEP;
+            let mut around = Surroundings::of(&self.body, &body, &self.cage, rest, reached);
             let weights = Weights {
                 shape: stiffness,
                 anchor: 1e-3,
                 volume: options.tightness,
                 quality: 1e-4,
                 reach,
-                least: options.clearance.min(0.5 * narrowest),
+                least: options.clearance.min(0.5 * around.narrowest()),
             };
             let here = self.cage.clone();
-            let moved = self.relax(&found, rest, &here, &weights, 2);
+            let moved = self.relax(&mut around, rest, &here, &weights, 2);
             if round % 8 == 7 {
                 reach = (0.6 * reach).max(4.0 * options.clearance);
                 stiffness = (0.5 * stiffness).max(0.05);
@@ -191,7 +206,7 @@ impl<'a> Inflation<'a> {
     /// Newton steps toward `goal`, none longer than a step together. How far anything moved.
     fn relax(
         &mut self,
-        found: &[Contact],
+        around: &mut Surroundings,
         obstacle: &[Point],
         goal: &[Point],
         weights: &Weights,
@@ -202,6 +217,7 @@ impl<'a> Inflation<'a> {
         let mut left = STEP;
         for _ in 0..rounds {
             let points = Points { cage: &self.cage, obstacle };
+            let found = around.within(weights.least + weights.reach + 2.0 * left);
             let mut step = newton_step(&shape, &points, found, weights);
             let longest = step.iter().map(|s| s.norm()).fold(1e-300, f64::max);
             if !longest.is_finite() || left < 1e-6 {
@@ -209,7 +225,7 @@ impl<'a> Inflation<'a> {
             }
             step.iter_mut().for_each(|s| *s *= (left / longest).min(1.0));
             let longest = longest.min(left);
-            let mut part = self.free(found, &points, Some(&step), None, weights.least);
+            let mut part = around.free(&points, Some(&step), None, weights.least);
             let before = energy(&shape, &points, found, weights);
             let mut moved = None;
             for _ in 0..10 {
@@ -222,6 +238,7 @@ impl<'a> Inflation<'a> {
             }
             let Some(next) = moved else { break };
             self.cage = next;
+            around.moved += 2.0 * part * longest;
             left -= part * longest;
             if part * longest < 1e-3 * weights.reach {
                 break;
@@ -230,23 +247,48 @@ impl<'a> Inflation<'a> {
         self.edges = edges;
         STEP - left
     }
+}
+
+/// The gaps around the cage, the narrowest first, and how far things have moved toward each other
+/// since they were found.
+struct Surroundings {
+    found: Vec<Contact>,
+    moved: f64,
+}
+
+impl Surroundings {
+    /// Of bodies fitted to `cage` and `obstacle`: every gap narrower than `reach`.
+    fn of(body: &Body, other: &Body, cage: &[Point], obstacle: &[Point], reach: f64) -> Self {
+        Self { found: contacts(body, other, &Points { cage, obstacle }, reach), moved: 0.0 }
+    }
+
+    /// When they were found.
+    fn narrowest(&self) -> f64 {
+        self.found.first().map_or(f64::INFINITY, |c| c.width)
+    }
+
+    /// All that may be narrower than `limit` by now.
+    fn within(&self, limit: f64) -> &[Contact] {
+        narrower(&self.found, limit + self.moved)
+    }
 
     /// The part of the moves after which every gap is open.
-    fn free(
-        &self,
-        found: &[Contact],
-        points: &Points,
-        cage: Option<&[Point]>,
-        obstacle: Option<&[Point]>,
-        least: f64,
-    ) -> f64 {
-        let n = self.cage.len();
+    fn free(&self, points: &Points, cage: Option<&[Point]>, obstacle: Option<&[Point]>, least: f64) -> f64 {
+        let n = points.cage.len();
         let way = |v: u32| {
             let v = v as usize;
             let moves = if v < n { cage.and_then(|m| m.get(v)) } else { obstacle.and_then(|m| m.get(v - n)) };
             moves.copied().unwrap_or_else(Point::zeros)
         };
         let part = |c: &Contact| free_part(c.gap, &points.of(c), &c.at.map(way), least);
-        found.par_iter().with_min_len(256).map(part).reduce(|| 1.0, f64::min)
+        let near = self.within(least + 1.3 * relative(cage, obstacle));
+        near.par_iter().with_min_len(256).map(part).reduce(|| 1.0, f64::min)
     }
+}
+
+/// No gap narrows by more than this.
+fn relative(cage: Option<&[Point]>, obstacle: Option<&[Point]>) -> f64 {
+    let longest = |moves: Option<&[Point]>| moves.unwrap_or(&[]).iter().map(|m| m.norm()).fold(0.0, f64::max);
+    let cage = longest(cage);
+    cage + cage.max(longest(obstacle))
 }

@@ -6,15 +6,17 @@
 //! all the way and hands out nothing that the exact check in [`verify`] has not passed.
 //! Every stage but the last works in a space where the skin has size 1.
 
+mod axis_samples;
 mod contacts;
 mod contraction;
 pub(crate) mod control_nodes;
 mod energy;
+mod extraction;
 pub(crate) mod field;
 mod inflation;
 mod obstacle;
-mod progress;
 mod report;
+mod rings;
 mod sections;
 pub(crate) mod skeleton;
 mod skin;
@@ -23,20 +25,24 @@ mod tubes;
 mod verify;
 
 pub use control_nodes::{NodeKind, Placement};
+pub use extraction::{extract_skeleton, ExtractedSkeleton};
 pub use inflation::InflationOptions;
-pub use progress::{Listener, Progress};
-pub use report::{CageReport, SectionReport};
+pub use report::{CageReport, Laps, SectionReport};
 pub use sections::SectionOptions;
 pub use skin::{Repairs, Skin};
 
 use crate::error::CagingError;
 use crate::mesh::Polygons;
 use crate::points::Point;
+use crate::progress::{Cancelled, Part};
 use contraction::Start;
 use control_nodes::{control_nodes, ControlNode};
 use inflation::Inflation;
-use sections::Section;
+use obstacle::Mesh;
+use rings::STARTS;
+use sections::{Section, Traced};
 use skeleton::{curve_skeleton, CurveSkeleton};
+use std::sync::OnceLock;
 use std::time::Instant;
 use tubes::{scaffold, Scaffold};
 
@@ -57,14 +63,36 @@ pub struct CagingOptions {
     pub asymmetric: bool,
 }
 
-/// A skin and its skeleton, ready for sections and cages.
-#[derive(Debug, Clone)]
+impl CagingOptions {
+    fn check(&self) -> Result<(), CagingError> {
+        let Self { sections, inflation, detail, .. } = self;
+        let lengths = [
+            ("reach", inflation.reach, 1e-4, 0.1),
+            ("clearance", inflation.clearance, 1e-5, 0.05),
+            ("tightness", inflation.tightness, 0.0, 100.0),
+            ("detail", *detail, 0.0, 1.0),
+            ("grid", sections.grid as f64, 12.0, 160.0),
+            ("corners", sections.corners as f64, 3.0, 8.0),
+            ("rounds", inflation.rounds as f64, 0.0, 1000.0),
+        ];
+        match lengths.into_iter().find(|(_, value, low, high)| !(low..=high).contains(&value)) {
+            Some((name, value, low, high)) => Err(CagingError::Option { name, value, low, high }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A skin and its skeleton, ready for sections and cages. Sections are kept by what they depend on
+/// (their node and the skeleton in their window), so that another call traces only those that
+/// changed.
+#[derive(Debug)]
 pub struct Generator {
     skin: Skin,
     skeleton: CurveSkeleton,
     options: CagingOptions,
-    original: (Vec<Point>, Vec<[u32; 3]>),
     graph: (Vec<Point>, Vec<[i64; 2]>),
+    traced: Traced,
+    proxy: OnceLock<(Mesh, f64)>,
 }
 
 /// Control nodes, their sections, and for each corner its mirror image on a symmetric character.
@@ -72,6 +100,8 @@ type CrossSections = (Vec<ControlNode>, Vec<Section>, Option<Vec<u32>>);
 
 /// When a cage fails with all leaves, leaves thinner than these are left out, one after the other.
 const COARSER: [f64; 2] = [0.005, 0.012];
+/// So many leaves may be left out where no cage closes around their branching node.
+const CUTS: usize = 24;
 
 /// A valid cage.
 #[derive(Debug, Clone)]
@@ -84,6 +114,25 @@ pub struct GeneratedCage {
     pub report: CageReport,
 }
 
+/// Why one attempt at a cage failed.
+enum Failure {
+    /// No cage closes around this junction.
+    Junction(usize, CagingError),
+    Other(CagingError),
+}
+
+impl From<CagingError> for Failure {
+    fn from(fault: CagingError) -> Self {
+        Self::Other(fault)
+    }
+}
+
+impl From<Cancelled> for Failure {
+    fn from(cancelled: Cancelled) -> Self {
+        Self::Other(cancelled.into())
+    }
+}
+
 impl Generator {
     /// Takes a skin (`vertices` `#V by 3`, closed) and a skeleton graph (`nodes` `#N by 3`, `edges`
     /// pairs of nodes), both in one space.
@@ -94,53 +143,57 @@ impl Generator {
         edges: &[[i64; 2]],
         options: CagingOptions,
     ) -> Result<Self, CagingError> {
+        options.check()?;
         let skin = Skin::new(vertices, faces)?;
-        let skeleton = curve_skeleton(&skin, nodes, edges, options.detail)?;
-        let original = (skin.original.clone(), skin.triangles.clone());
-        Ok(Self { skin, skeleton, options, original, graph: (nodes.to_vec(), edges.to_vec()) })
+        let skeleton = curve_skeleton(&skin, nodes, edges, options.detail, &[])?;
+        let graph = (nodes.to_vec(), edges.to_vec());
+        Ok(Self { skin, skeleton, options, graph, traced: Traced::default(), proxy: OnceLock::new() })
     }
 
     /// Control nodes and their cross sections; `bending`: the user's nodes, near the skeleton.
     pub fn sections(
         &self,
         bending: Option<&[Point]>,
-        progress: &Progress,
+        part: &Part,
     ) -> Result<Vec<SectionReport>, CagingError> {
-        let (nodes, sections, _) = self.cross_sections(bending, progress)?;
+        let (nodes, sections, _) = self.cross_sections(&self.skeleton, bending, part)?;
         Ok(report::sections(&self.skin, &nodes, &sections))
     }
 
     fn cross_sections(
         &self,
+        skeleton: &CurveSkeleton,
         bending: Option<&[Point]>,
-        progress: &Progress,
+        part: &Part,
     ) -> Result<CrossSections, CagingError> {
-        let nodes = control_nodes(&self.skin, &self.skeleton, bending, self.options.placement)?;
-        let mut found =
-            sections::sections(&self.skin, &self.skeleton, &nodes, &self.options.sections, progress)?;
+        let mut nodes = control_nodes(&self.skin, skeleton, bending, self.options.placement)?;
         let symmetric = !self.options.asymmetric && symmetry::is_symmetric(&self.skin);
-        let mirror = if symmetric { symmetry::symmetrise(&nodes, &mut found) } else { None };
+        let partners = if symmetric { symmetry::partners(&nodes) } else { None };
+        if let Some(partners) = &partners {
+            symmetry::mirror_nodes(&mut nodes, partners);
+        }
+        let options = &self.options.sections;
+        let mut found =
+            self.traced.sections(&self.skin, skeleton, &nodes, (options, partners.as_deref()), part)?;
+        let mirror = partners.and_then(|partners| symmetry::symmetrise(&nodes, &mut found, &partners));
         Ok((nodes, found, mirror))
     }
 
-    /// The cage. `bending` as in [`Generator::sections`]. Without it, thin leaves (fingers) that no
-    /// cage can be grown for are left out; the report names their nodes as dropped.
-    pub fn generate(
-        &self,
-        bending: Option<&[Point]>,
-        progress: &Progress,
-    ) -> Result<GeneratedCage, CagingError> {
-        let first = self.attempt(bending, progress);
-        if !first.as_ref().is_err_and(|fault| bending.is_none() && fault.is_of_growth()) {
+    /// The cage. `bending` as in [`Generator::sections`]. Without it, leaves of the skeleton are left
+    /// out where no cage closes around their branching node, and thin ones (fingers) where no cage
+    /// can be grown around them; the report names their nodes as dropped.
+    pub fn generate(&self, bending: Option<&[Point]>, part: &Part) -> Result<GeneratedCage, CagingError> {
+        let first = self.generate_with(self.skeleton.clone(), bending, part);
+        let fingers = |fault: &CagingError| bending.is_none() && fault.is_of_growth();
+        if !first.as_ref().is_err_and(fingers) {
             return first;
         }
         let mut arcs = self.skeleton.arcs.len();
         for detail in COARSER {
-            let mut coarser = self.clone();
-            coarser.skeleton = curve_skeleton(&self.skin, &self.graph.0, &self.graph.1, detail)?;
-            if coarser.skeleton.arcs.len() < arcs {
-                arcs = coarser.skeleton.arcs.len();
-                match coarser.attempt(bending, progress) {
+            let coarser = curve_skeleton(&self.skin, &self.graph.0, &self.graph.1, detail, &[])?;
+            if coarser.arcs.len() < arcs {
+                arcs = coarser.arcs.len();
+                match self.generate_with(coarser, bending, part) {
                     Err(fault) if fault.is_of_growth() => {}
                     found => return found,
                 }
@@ -149,68 +202,101 @@ impl Generator {
         first
     }
 
-    fn attempt(&self, bending: Option<&[Point]>, progress: &Progress) -> Result<GeneratedCage, CagingError> {
+    /// Leaves out leaves where no cage closes around their branching node.
+    fn generate_with(
+        &self,
+        mut skeleton: CurveSkeleton,
+        bending: Option<&[Point]>,
+        part: &Part,
+    ) -> Result<GeneratedCage, CagingError> {
+        let mut without = Vec::new();
+        loop {
+            let (junction, fault) = match self.attempt(&skeleton, bending, part) {
+                Ok(found) => return Ok(found),
+                Err(Failure::Other(fault)) => return Err(fault),
+                Err(Failure::Junction(junction, fault)) => (junction, fault),
+            };
+            let Some(tip) = skeleton.least_leaf(junction).filter(|_| without.len() < CUTS) else {
+                return Err(fault);
+            };
+            without.push(tip);
+            skeleton =
+                curve_skeleton(&self.skin, &self.graph.0, &self.graph.1, self.options.detail, &without)?;
+        }
+    }
+
+    fn attempt(
+        &self,
+        skeleton: &CurveSkeleton,
+        bending: Option<&[Point]>,
+        part: &Part,
+    ) -> Result<GeneratedCage, Failure> {
         let mut clock = Clock::new();
-        let (nodes, sections, mirror) = self.cross_sections(bending, progress)?;
+        let [tracing, starting, growing, tightening, checking] = part.split([1.0, 0.5, 4.0, 3.0, 0.3]);
+        tracing.begin("cross sections")?;
+        let (nodes, sections, mirror) = self.cross_sections(skeleton, bending, &tracing)?;
         clock.lap("sections");
-        let (proxy, margin) = obstacle::proxy(&self.skin);
+        starting.begin("a start inside the skin")?;
+        let (proxy, margin) = self.proxy.get_or_init(|| obstacle::proxy(&self.skin));
         clock.lap("obstacle");
-        let (scaffold, start) = self.start(&nodes, &sections, (&proxy.0, &proxy.1), progress)?;
+        let (scaffold, start) = self.start(skeleton, (&nodes, &sections), proxy, &starting)?;
         clock.lap("contraction");
+        growing.begin("growing the cage")?;
         let mut inflation = Inflation::new(&scaffold, mirror.as_deref(), start.cage.clone());
         let options = &self.options.inflation;
-        let least = options.clearance + margin;
-        let grown = inflation.grow(start, (&proxy.0, &proxy.1), options, least, progress)?;
+        let grown = inflation.grow(start, options, options.clearance + margin, &growing)?;
         if let Err(halt) = grown {
             let node = nodes[scaffold.owner[halt.vertex]].node;
-            return Err(CagingError::Stuck {
-                node,
-                place: self.skin.space.leave(&inflation.cage[halt.vertex]),
-            });
+            let place = self.skin.space.leave(&inflation.cage[halt.vertex]);
+            return Err(CagingError::Stuck { node, place }.into());
         }
         clock.lap("growth");
-        inflation.tighten((&self.skin.points, &self.skin.triangles), options, progress)?;
+        tightening.begin("tightening the cage")?;
+        inflation.tighten((&self.skin.points, &self.skin.triangles), options, &tightening)?;
         clock.lap("tightening");
-        progress.step("verify", 0.0)?;
+        checking.begin("checking the cage")?;
         let vertices: Vec<Point> = inflation.cage.iter().map(|p| self.skin.space.leave(p)).collect();
-        let (skin, triangles) = (&self.original.0, &self.original.1);
+        let (skin, triangles) = (&self.skin.original, &self.skin.triangles);
         if let Some(fault) = verify::fault(&vertices, &scaffold.triangles(), skin, triangles) {
             let node = nodes[scaffold.owner[fault.vertex]].node;
-            return Err(CagingError::NotValid { node, place: vertices[fault.vertex], fault: fault.what });
+            return Err(
+                CagingError::NotValid { node, place: vertices[fault.vertex], fault: fault.what }.into()
+            );
         }
         let faces = self.faces(&scaffold, &vertices);
         clock.lap("verify");
-        let report = report::cage(self, (&nodes, &sections, &scaffold), &vertices, (mirror, clock.laps));
+        let dropped = skeleton.dropped.clone();
+        let found = (&nodes[..], &sections[..], &scaffold);
+        let report = report::cage(&self.skin, found, &vertices, (mirror, dropped, clock.laps));
         Ok(GeneratedCage { vertices, faces, report })
     }
 
-    /// The faces, and a start free of crossings: the largest sections that have one.
+    /// The faces, and a start free of crossings: the largest rings that have one.
     fn start(
         &self,
-        nodes: &[ControlNode],
-        sections: &[Section],
-        (points, triangles): (&[Point], &[[u32; 3]]),
-        progress: &Progress,
-    ) -> Result<(Scaffold, Start), CagingError> {
-        let scales = [0.7, 0.5, 0.35, 0.25, 0.15, 0.08, 0.04];
-        let mut fault = CagingError::TooFewSections { sections: nodes.len() };
-        for (k, scale) in scales.into_iter().enumerate() {
-            progress.step("contraction", k as f64 / scales.len() as f64)?;
-            let joined = match scaffold(&self.skeleton, nodes, sections, scale) {
+        skeleton: &CurveSkeleton,
+        (nodes, sections): (&[ControlNode], &[Section]),
+        proxy: &Mesh,
+        part: &Part,
+    ) -> Result<(Scaffold, Start), Failure> {
+        let mut fault = Failure::Other(CagingError::TooFewSections { sections: nodes.len() });
+        for (k, rings) in STARTS.into_iter().enumerate() {
+            part.reach(k as f64 / STARTS.len() as f64)?;
+            let joined = match scaffold(skeleton, nodes, sections, rings.corners(nodes, sections)) {
                 Ok(joined) => joined,
-                Err(junction) => {
-                    let junction = &self.skeleton.junctions[junction];
+                Err(at) => {
+                    let junction = &skeleton.junctions[at];
                     let place = self.skin.space.leave(&junction.point);
-                    fault = CagingError::NoStart { node: junction.node, place };
+                    fault = Failure::Junction(at, CagingError::NoStart { node: junction.node, place });
                     continue;
                 }
             };
-            match contraction::start(&joined, sections, points, triangles, scale) {
+            match contraction::start(&joined, sections, proxy) {
                 Ok(start) => return Ok((joined, start)),
                 Err(vertex) => {
                     let at = joined.owner[vertex];
                     let place = self.skin.space.leave(&joined.centers[at]);
-                    fault = CagingError::NoStart { node: nodes[at].node, place };
+                    fault = CagingError::NoStart { node: nodes[at].node, place }.into();
                 }
             }
         }
@@ -223,7 +309,7 @@ impl Generator {
         if self.options.triangles {
             return Polygons::from_triangles(&triangles);
         }
-        let tree = crate::geometry::bvh::Bvh::new(&self.original.0, &self.original.1);
+        let tree = crate::geometry::bvh::Bvh::new(&self.skin.original, &self.skin.triangles);
         let mut faces = Polygons::default();
         for polygon in &scaffold.polygons {
             let pieces = tubes::split(&scaffold.corners, polygon);
@@ -232,7 +318,7 @@ impl Generator {
                     &pieces,
                     vertices,
                     &triangles,
-                    (&self.original.0, &self.original.1),
+                    (&self.skin.original, &self.skin.triangles),
                     &tree,
                 );
             if whole {
@@ -254,7 +340,7 @@ impl Generator {
 /// Seconds spent in each stage.
 struct Clock {
     last: Instant,
-    laps: Vec<(&'static str, f64)>,
+    laps: Laps,
 }
 
 impl Clock {

@@ -4,7 +4,6 @@ use super::control_nodes::{ControlNode, NodeKind};
 use super::sections::Section;
 use super::skin::{Repairs, Skin};
 use super::tubes::Scaffold;
-use super::Generator;
 use crate::geometry::bvh::Bvh;
 use crate::points::Point;
 use rayon::prelude::*;
@@ -30,6 +29,9 @@ pub struct SectionReport {
     pub corners: Vec<Point>,
 }
 
+/// Stages with their seconds.
+pub type Laps = Vec<(&'static str, f64)>;
+
 /// How a cage came about and how good it is.
 #[derive(Debug, Clone)]
 pub struct CageReport {
@@ -54,7 +56,7 @@ pub struct CageReport {
     /// Loops of the cage.
     pub genus: i64,
     /// Seconds by stage.
-    pub timings: Vec<(&'static str, f64)>,
+    pub timings: Laps,
 }
 
 pub(super) fn sections(skin: &Skin, nodes: &[ControlNode], found: &[Section]) -> Vec<SectionReport> {
@@ -76,12 +78,11 @@ pub(super) fn sections(skin: &Skin, nodes: &[ControlNode], found: &[Section]) ->
 }
 
 pub(super) fn cage(
-    generator: &Generator,
+    skin: &Skin,
     (nodes, found, scaffold): (&[ControlNode], &[Section], &Scaffold),
     vertices: &[Point],
-    (mirror, timings): (Option<Vec<u32>>, Vec<(&'static str, f64)>),
+    (mirror, dropped, timings): (Option<Vec<u32>>, Vec<usize>, Laps),
 ) -> CageReport {
-    let skin = &generator.skin;
     let unit: Vec<Point> = vertices.iter().map(|p| skin.space.enter(p)).collect();
     let faces = scaffold.triangles();
     let tree = Bvh::new(&unit, &faces);
@@ -95,7 +96,7 @@ pub(super) fn cage(
     CageReport {
         sections: sections(skin, nodes, found),
         vertex_sections: scaffold.owner.clone(),
-        dropped: generator.skeleton.dropped.clone(),
+        dropped,
         repairs: skin.repairs,
         volume_ratio: volume(&unit, &faces) / volume(&skin.points, &skin.triangles).abs().max(1e-300),
         mean_distance: mean_distance(skin, &unit, &faces),

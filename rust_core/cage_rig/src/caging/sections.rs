@@ -6,13 +6,17 @@
 //! cyclic order and spaced, chosen together. A window costs about 20 ms; windows run in parallel.
 
 use super::control_nodes::{ControlNode, NodeKind};
-use super::field::Field;
-use super::progress::Progress;
+use super::field::{self, Field};
 use super::skeleton::CurveSkeleton;
 use super::skin::Skin;
 use crate::error::CagingError;
 use crate::points::{Matrix3, Point};
+use crate::progress::Part;
 use rayon::prelude::*;
+use std::collections::hash_map::DefaultHasher;
+use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
+use std::sync::{Mutex, PoisonError};
 
 /// Seeds on the circle.
 const SEEDS: usize = 20;
@@ -44,24 +48,59 @@ pub(crate) struct Section {
     pub(crate) center: Point,
 }
 
-/// One section for each control node.
-pub(crate) fn sections(
-    skin: &Skin,
-    skeleton: &CurveSkeleton,
-    nodes: &[ControlNode],
-    options: &SectionOptions,
-    progress: &Progress,
-) -> Result<Vec<Section>, CagingError> {
-    let done = std::sync::atomic::AtomicUsize::new(0);
-    nodes
-        .par_iter()
-        .map(|node| {
-            let found = section(skin, skeleton, node, options);
-            let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            progress.step("sections", count as f64 / nodes.len() as f64)?;
-            found.ok_or(CagingError::NoSection { node: node.node, place: skin.space.leave(&node.point) })
-        })
-        .collect()
+/// The sections traced so far, by what they depend on.
+#[derive(Debug, Default)]
+pub(crate) struct Traced(Mutex<HashMap<u64, Section>>);
+
+impl Traced {
+    /// One section for each control node. With `partners` (of a symmetric skin), only the first of two
+    /// mirrored nodes has its own; that of the second is a copy to be replaced by the image.
+    pub(crate) fn sections(
+        &self,
+        skin: &Skin,
+        skeleton: &CurveSkeleton,
+        nodes: &[ControlNode],
+        (options, partners): (&SectionOptions, Option<&[usize]>),
+        part: &Part,
+    ) -> Result<Vec<Section>, CagingError> {
+        let count = part.count(nodes.len());
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let of_node = |(at, node): (usize, &ControlNode)| {
+            if partners.is_some_and(|partners| partners[at] < at) {
+                return Ok(None);
+            }
+            let key = key(skeleton, node);
+            let kept = lock().get(&key).cloned();
+            let found = kept.or_else(|| section(skin, skeleton, node, options));
+            count.step(1)?;
+            let found = found
+                .ok_or(CagingError::NoSection { node: node.node, place: skin.space.leave(&node.point) })?;
+            lock().insert(key, found.clone());
+            Ok(Some(found))
+        };
+        let found: Vec<Option<Section>> =
+            nodes.par_iter().enumerate().map(of_node).collect::<Result<_, CagingError>>()?;
+        let own = |at: usize| found[at].clone().or_else(|| found[partners?[at]].clone());
+        Ok((0..nodes.len()).filter_map(own).collect())
+    }
+
+    #[cfg(test)]
+    fn len(&self) -> usize {
+        self.0.lock().map_or(0, |kept| kept.len())
+    }
+}
+
+/// Of the node and of the skeleton within its window.
+fn key(skeleton: &CurveSkeleton, node: &ControlNode) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let mut add = |p: &Point, r: f64| [p.x, p.y, p.z, r].iter().for_each(|x| x.to_bits().hash(&mut hasher));
+    add(&node.point, node.radius);
+    add(&node.direction, if node.kind == NodeKind::Leaf { 1.0 } else { 0.0 });
+    for (a, b, radii) in field::near(skeleton, &node.point, node.radius) {
+        add(&a, radii[0]);
+        add(&b, radii[1]);
+    }
+    hasher.finish()
 }
 
 /// The section of one node; `None` where the field lines don't reach the skin around it.
@@ -211,11 +250,23 @@ fn principal_axes(ring: &[Point], direction: &Point) -> ([Point; 2], [f64; 2]) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::caging::control_nodes::{control_nodes, Placement};
     use crate::caging::skeleton::curve_skeleton;
     use crate::fixtures::shapes::square_tube;
+    use crate::progress::Progress;
+
+    pub(crate) fn unwatched_sections(
+        traced: &Traced,
+        skin: &Skin,
+        skeleton: &CurveSkeleton,
+        nodes: &[ControlNode],
+        options: &SectionOptions,
+    ) -> Vec<Section> {
+        let progress = Progress::default();
+        traced.sections(skin, skeleton, nodes, (options, None), &progress.whole()).expect("sections")
+    }
 
     #[test]
     fn a_square_bar_has_sections_with_its_corners() {
@@ -223,12 +274,13 @@ mod tests {
         let (vertices, faces) = square_tube(&rings);
         let skin = Skin::new(&vertices, &faces).expect("closed");
         let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
-        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0).expect("inside");
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0, &[]).expect("inside");
         let nodes = control_nodes(&skin, &skeleton, Some(&[Point::new(5.0, 0.3, 0.0)]), Placement::Joints);
         let nodes = nodes.expect("three");
         assert_eq!(nodes.len(), 3);
-        let found = sections(&skin, &skeleton, &nodes, &SectionOptions::default(), &Progress::silent());
-        let found = found.expect("sections");
+        let traced = Traced::default();
+        let options = SectionOptions::default();
+        let found = unwatched_sections(&traced, &skin, &skeleton, &nodes, &options);
         let middle: Vec<Point> = found[1].corners.iter().map(|p| skin.space.leave(p)).collect();
         for p in &middle {
             assert!((p.x - 5.0).abs() < 0.1, "{p}");
@@ -236,5 +288,21 @@ mod tests {
         }
         let turn = (middle[1] - middle[0]).cross(&(middle[2] - middle[0]));
         assert!(turn.x > 0.0);
+    }
+
+    #[test]
+    fn only_what_changed_is_traced_again() {
+        let rings: Vec<(f64, f64)> = (0..11).map(|i| (f64::from(i), 1.0)).collect();
+        let (vertices, faces) = square_tube(&rings);
+        let skin = Skin::new(&vertices, &faces).expect("closed");
+        let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0, &[]).expect("inside");
+        let traced = Traced::default();
+        for (middle, count) in [(5.0, 4), (5.0, 4), (5.5, 5)] {
+            let bending = [Point::new(3.0, 0.0, 0.0), Point::new(middle, 0.0, 0.0)];
+            let nodes = control_nodes(&skin, &skeleton, Some(&bending), Placement::Joints).expect("four");
+            unwatched_sections(&traced, &skin, &skeleton, &nodes, &SectionOptions::default());
+            assert_eq!(traced.len(), count);
+        }
     }
 }

@@ -89,6 +89,26 @@ impl Arc {
     }
 }
 
+impl CurveSkeleton {
+    /// The tip (a node of the input) of the leaf at a junction that sticks out the least, or of one
+    /// at a neighbouring junction.
+    pub(crate) fn least_leaf(&self, junction: usize) -> Option<usize> {
+        let leaf = |at: usize| {
+            let tips =
+                self.arcs.iter().flat_map(|arc| [(arc.ends[0], arc.ends[1]), (arc.ends[1], arc.ends[0])]);
+            let tips = tips.filter(|(base, tip)| *base == at && self.junctions[*tip].degree == 1);
+            let reach = |tip: usize| (self.junctions[tip].point - self.junctions[at].point).norm();
+            tips.map(|(_, tip)| (reach(tip), tip)).min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let near = || {
+            let ends = self.arcs.iter().map(|arc| arc.ends);
+            let others = ends.flat_map(|[a, b]| [(a, b), (b, a)]).filter(|(a, _)| *a == junction);
+            others.filter_map(|(_, b)| leaf(b)).min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        leaf(junction).or_else(near).map(|(_, tip)| self.junctions[tip].node)
+    }
+}
+
 /// The graph while it is being worked on.
 struct Graph {
     points: Vec<Point>,
@@ -98,12 +118,13 @@ struct Graph {
 }
 
 /// Cleans the graph of `nodes` (`#N by 3`, the user's space) and `edges` and cuts it into arcs. Leaves
-/// thinner than `detail` (of the size) are left out.
+/// thinner than `detail` (of the size) are left out, and those whose tip is one of the nodes `without`.
 pub(crate) fn curve_skeleton(
     skin: &Skin,
     nodes: &[Point],
     edges: &[[i64; 2]],
     detail: f64,
+    without: &[usize],
 ) -> Result<CurveSkeleton, CagingError> {
     let mut graph = read(skin, nodes, edges)?;
     clip(skin, &mut graph)?;
@@ -114,7 +135,7 @@ pub(crate) fn curve_skeleton(
         if skeleton.arcs.is_empty() {
             return Err(CagingError::SkeletonOutside);
         }
-        if !prune(skin, &mut graph, &skeleton, detail) && !merge(&mut graph, &skeleton) {
+        if !prune(skin, &mut graph, &skeleton, (detail, without)) && !merge(&mut graph, &skeleton) {
             return Ok(skeleton);
         }
     }
@@ -326,7 +347,12 @@ fn arc(skin: &Skin, graph: &Graph, ends: [usize; 2], walk: &[usize]) -> Arc {
 }
 
 /// Removes one leaf arc that does not stick out. True when there was one.
-fn prune(skin: &Skin, graph: &mut Graph, skeleton: &CurveSkeleton, detail: f64) -> bool {
+fn prune(
+    skin: &Skin,
+    graph: &mut Graph,
+    skeleton: &CurveSkeleton,
+    (detail, without): (f64, &[usize]),
+) -> bool {
     let mut leaves: Vec<(usize, usize, usize)> = Vec::new();
     for (k, arc) in skeleton.arcs.iter().enumerate() {
         for side in 0..2 {
@@ -343,7 +369,7 @@ fn prune(skin: &Skin, graph: &mut Graph, skeleton: &CurveSkeleton, detail: f64) 
         let (p, b) = (skeleton.junctions[tip].point, &skeleton.junctions[base]);
         let mut radii = skeleton.arcs[k].radii.clone();
         radii.sort_by(f64::total_cmp);
-        let thin = radii[radii.len() / 2] < detail;
+        let thin = radii[radii.len() / 2] < detail || without.contains(&skeleton.junctions[tip].node);
         let short = thin || reach(tip, base) < 1.4 * b.radius || skeleton.arcs[k].length() < 1e-2;
         let sibling = |&(other, far, at): &(usize, usize, usize)| {
             let q = skeleton.junctions[far].point;

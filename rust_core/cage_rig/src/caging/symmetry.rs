@@ -27,23 +27,40 @@ pub(crate) fn is_symmetric(skin: &Skin) -> bool {
     samples.par_iter().all(near)
 }
 
-/// Makes the sections symmetric. For each corner its mirror image; `None`, and nothing changed, when
-/// some control node has no partner.
-pub(crate) fn symmetrise(nodes: &[ControlNode], sections: &mut [Section]) -> Option<Vec<u32>> {
-    let count = sections.first()?.corners.len();
+/// For each control node that at its mirror image; `None` when some node has none.
+pub(crate) fn partners(nodes: &[ControlNode]) -> Option<Vec<usize>> {
     let partner = |i: usize| {
-        let wanted = image(&sections[i].center);
-        let distance = |j: usize| (sections[j].center - wanted).norm();
-        let best = (0..sections.len()).min_by(|a, b| distance(*a).total_cmp(&distance(*b)))?;
+        let wanted = image(&nodes[i].point);
+        let distance = |j: usize| (nodes[j].point - wanted).norm();
+        let best = (0..nodes.len()).min_by(|a, b| distance(*a).total_cmp(&distance(*b)))?;
         (distance(best) < nodes[i].radius && nodes[best].kind == nodes[i].kind).then_some(best)
     };
-    let partners: Vec<usize> = (0..sections.len()).map(partner).collect::<Option<_>>()?;
+    let found: Vec<usize> = (0..nodes.len()).map(partner).collect::<Option<_>>()?;
+    (0..nodes.len()).all(|i| found[found[i]] == i).then_some(found)
+}
+
+/// Moves the second of every two mirrored nodes to the image of the first.
+pub(crate) fn mirror_nodes(nodes: &mut [ControlNode], partners: &[usize]) {
+    for (i, &j) in partners.iter().enumerate().filter(|(i, j)| i < j) {
+        let along = image(&nodes[i].direction);
+        let sign = if along.dot(&nodes[j].direction) > 0.0 { 1.0 } else { -1.0 };
+        nodes[j].point = image(&nodes[i].point);
+        nodes[j].direction = along * sign;
+        nodes[j].radius = nodes[i].radius;
+    }
+}
+
+/// Makes the sections symmetric. For each corner its mirror image; `None`, and nothing changed, when
+/// the corners of a section on the plane don't pair up.
+pub(crate) fn symmetrise(
+    nodes: &[ControlNode],
+    sections: &mut [Section],
+    partners: &[usize],
+) -> Option<Vec<u32>> {
+    let count = sections.first()?.corners.len();
     let mut mirror = vec![0; count * sections.len()];
     let mut changed = sections.to_vec();
     for (i, &j) in partners.iter().enumerate() {
-        if partners[j] != i {
-            return None;
-        }
         if i == j {
             let pairs = pair_up(&sections[i].corners)?;
             for (k, &m) in pairs.iter().enumerate() {
@@ -53,6 +70,10 @@ pub(crate) fn symmetrise(nodes: &[ControlNode], sections: &mut [Section]) -> Opt
         } else if i < j {
             // A mirror image turns the other way, and so does a partner whose arc runs backward.
             let along = image(&nodes[i].direction).dot(&nodes[j].direction) > 0.0;
+            changed[j].ring = sections[i].ring.iter().rev().map(image).collect();
+            if !along {
+                changed[j].ring.reverse();
+            }
             for k in 0..count {
                 let m = if along { count - 1 - k } else { k };
                 changed[j].corners[m] = image(&sections[i].corners[k]);

@@ -19,6 +19,8 @@ use crate::points::Point;
 pub(crate) struct Scaffold {
     /// Corners of the sections, node after node.
     pub(crate) corners: Vec<Point>,
+    /// The same corners on rings so small that nothing crosses: where the cage starts.
+    pub(crate) start: Vec<Point>,
     /// The control node of each corner.
     pub(crate) owner: Vec<usize>,
     /// Center of each control node's section.
@@ -42,10 +44,13 @@ impl Scaffold {
         self.polygons.iter().flat_map(|p| split(&self.corners, p)).collect()
     }
 
-    /// Corners with their sections scaled about their centers.
-    pub(crate) fn scaled(&self, scale: f64) -> Vec<Point> {
-        let scaled = |(p, node): (&Point, &usize)| self.centers[*node] + (p - self.centers[*node]) * scale;
-        self.corners.iter().zip(&self.owner).map(scaled).collect()
+    /// Corners on their way from the start to the sections, a little beyond at 1.
+    pub(crate) fn grown(&self, part: f64) -> Vec<Point> {
+        let grown = |((p, q), node): ((&Point, &Point), &usize)| {
+            let target = self.centers[*node] + (p - self.centers[*node]) * 1.05;
+            q + (target - q) * part
+        };
+        self.corners.iter().zip(&self.start).zip(&self.owner).map(grown).collect()
     }
 }
 
@@ -62,18 +67,19 @@ pub(crate) fn split(points: &[Point], polygon: &[u32]) -> Vec<[u32; 3]> {
     (1..polygon.len() - 1).map(|k| [polygon[0], polygon[k], polygon[k + 1]]).collect()
 }
 
-/// Joins the sections. `scale`: about their centers, at which branches are to be star-shaped; else
-/// the junction that can't be is returned.
+/// Joins the sections. Branches are star-shaped with the corners at `start`; else the junction that
+/// can't be is returned.
 pub(crate) fn scaffold(
     skeleton: &CurveSkeleton,
     nodes: &[ControlNode],
     sections: &[Section],
-    scale: f64,
+    start: Vec<Point>,
 ) -> Result<Scaffold, usize> {
     let count = sections.first().map_or(4, |s| s.corners.len());
     let centers: Vec<Point> = sections.iter().map(|s| s.center).collect();
     let mut built = Scaffold {
         corners: sections.iter().flat_map(|s| s.corners.iter().copied()).collect(),
+        start,
         owner: (0..nodes.len()).flat_map(|n| vec![n; count]).collect(),
         axis: Axis { points: centers.clone(), edges: Vec::new() },
         centers,
@@ -114,7 +120,7 @@ pub(crate) fn scaffold(
     }
     for (junction, members) in at_junction.iter().enumerate() {
         if members.len() >= 2 {
-            let found = built.branch(&skeleton.junctions[junction].point, members, &ring, scale);
+            let found = built.branch(&skeleton.junctions[junction].point, members, &ring);
             let center = found.ok_or(junction)?;
             let at = built.axis.points.len();
             built.axis.points.push(center);
@@ -157,7 +163,6 @@ impl Scaffold {
         start: &Point,
         members: &[(usize, bool)],
         ring: &impl Fn(usize) -> Vec<u32>,
-        scale: f64,
     ) -> Option<Point> {
         let mean = members.iter().map(|(n, _)| self.centers[*n]).sum::<Point>() / members.len() as f64;
         let rings: Vec<Vec<u32>> = members
@@ -172,7 +177,7 @@ impl Scaffold {
             .collect();
         for blend in [0.5, 0.25, 0.75, 0.0, 1.0] {
             let center = start + (mean - start) * blend;
-            if let Some(faces) = self.star(&center, members, &rings, scale) {
+            if let Some(faces) = self.star(&center, &rings) {
                 self.polygons.extend(faces);
                 return Some(center);
             }
@@ -180,25 +185,15 @@ impl Scaffold {
         None
     }
 
-    /// Faces between the rings that are star-shaped about `center`, sections scaled by `scale`.
-    fn star(
-        &self,
-        center: &Point,
-        members: &[(usize, bool)],
-        rings: &[Vec<u32>],
-        scale: f64,
-    ) -> Option<Vec<Vec<u32>>> {
-        let corner = |node: usize, v: u32| {
-            let p = self.centers[node] + (self.corners[v as usize] - self.centers[node]) * scale;
-            (p - center).try_normalize(1e-9)
-        };
+    /// Faces between the rings that are star-shaped about `center` at the start.
+    fn star(&self, center: &Point, rings: &[Vec<u32>]) -> Option<Vec<Vec<u32>>> {
         let mut global = Vec::new();
         let mut points = Vec::new();
         let mut local: Vec<Vec<u32>> = Vec::new();
-        for ((node, _), ring) in members.iter().zip(rings) {
+        for ring in rings {
             let first = points.len() as u32;
             for v in ring {
-                points.push(corner(*node, *v)?);
+                points.push((self.start[*v as usize] - center).try_normalize(1e-9)?);
                 global.push(*v);
             }
             local.push((first..points.len() as u32).collect());
@@ -305,6 +300,7 @@ mod tests {
         let found: Vec<Section> = ways.iter().map(|d| quad(*d, *d, 0.4)).collect();
         let mut built = Scaffold {
             corners: found.iter().flat_map(|s| s.corners.clone()).collect(),
+            start: found.iter().flat_map(|s| s.corners.clone()).collect(),
             owner: (0..24).map(|v| v / 4).collect(),
             centers: ways.to_vec(),
             polygons: Vec::new(),
@@ -312,7 +308,7 @@ mod tests {
         };
         let members: Vec<(usize, bool)> = (0..6).map(|n| (n, true)).collect();
         let ring = |n: usize| (0..4).map(|k| (4 * n + k) as u32).collect::<Vec<u32>>();
-        assert!(built.branch(&Point::zeros(), &members, &ring, 0.9).is_some());
+        assert!(built.branch(&Point::zeros(), &members, &ring).is_some());
         for n in 0..6 {
             built.polygons.push(ring(n));
         }

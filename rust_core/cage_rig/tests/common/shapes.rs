@@ -19,6 +19,23 @@ pub fn square_tube(rings: &[(f64, f64)]) -> (Vec<Point>, Polygons) {
     (points, Polygons { corners: quads.concat(), sizes: vec![4; quads.len()] })
 }
 
+/// A ring in the plane of x and y: `around` sections of `about` corners at `radius`, as thick as `tube`.
+pub fn torus(around: usize, about: usize, radius: f64, tube: f64) -> (Vec<Point>, Polygons) {
+    let turn = |k: usize, n: usize| (k as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+    let mut points = Vec::new();
+    let mut corners = Vec::new();
+    for i in 0..around {
+        for k in 0..about {
+            let ((s, c), (t, d)) = (turn(i, around), turn(k, about));
+            points.push(Point::new(c * (radius + tube * d), s * (radius + tube * d), tube * t));
+            let at = |i: usize, k: usize| ((i % around) * about + k % about) as i64;
+            corners.extend([at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]);
+        }
+    }
+    let sizes = vec![4; around * about];
+    (points, Polygons { corners, sizes })
+}
+
 /// An icosahedron split `level` times, on the unit sphere, outward.
 pub fn icosphere(level: usize) -> (Vec<Point>, Vec<[i64; 3]>) {
     let g = (1.0 + 5.0f64.sqrt()) / 2.0;

@@ -1,0 +1,271 @@
+//! A curve skeleton for a skin that has none: the graph of the parts of level sets.
+//!
+//! The distance along the surface from one of its far ends is cut into bands; each connected part of a
+//! band is a ring around a limb, and becomes a node in its middle; rings that touch are linked
+//! (level set diagrams after Lazarus and Verroust, 1999: a Reeb graph, which has a loop for each
+//! handle and a leaf for each limb). Straight runs are thinned out. `n log n` in the triangles.
+
+use super::obstacle::{proxy, Mesh};
+use super::skin::Skin;
+use crate::error::CagingError;
+use crate::mesh::Polygons;
+use crate::points::Point;
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
+
+/// Bands from one end to the other, fewer on a coarse mesh.
+const BANDS: f64 = 48.0;
+/// Rounds of smoothing of the distance, which runs along edges, before it is cut.
+const SMOOTHING: usize = 20;
+/// A node is left out where it is nearer than this to the straight line, in radii.
+const STRAIGHT: f64 = 0.25;
+
+/// A graph of straight lines.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ExtractedSkeleton {
+    /// `#N by 3`, the skin's space.
+    pub nodes: Vec<Point>,
+    /// Pairs of nodes.
+    pub edges: Vec<[i64; 2]>,
+}
+
+/// The curve skeleton of a closed skin (`vertices` `#V by 3`).
+pub fn extract_skeleton(vertices: &[Point], faces: &Polygons) -> Result<ExtractedSkeleton, CagingError> {
+    let skin = Skin::new(vertices, faces)?;
+    let (Mesh { points, triangles }, _) = proxy(&skin);
+    let around = neighbours(points.len(), &triangles);
+    let distance = surface_distance(&points, &around);
+    let rings = rings(&points, &around, &distance);
+    let graph = thin(&skin, rings);
+    if graph.edges.is_empty() {
+        return Err(CagingError::SkeletonEmpty);
+    }
+    Ok(ExtractedSkeleton {
+        nodes: graph.points.iter().map(|p| skin.space.leave(p)).collect(),
+        edges: graph.edges.iter().map(|(a, b)| [*a as i64, *b as i64]).collect(),
+    })
+}
+
+fn neighbours(count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut found = vec![Vec::new(); count];
+    for t in triangles {
+        for k in 0..3 {
+            found[t[k] as usize].push(t[(k + 1) % 3]);
+        }
+    }
+    found
+}
+
+/// Distances along edges from the vertex `start`; infinite on other parts of the surface.
+fn along_edges(points: &[Point], around: &[Vec<u32>], start: usize) -> Vec<f64> {
+    let mut best = vec![f64::INFINITY; points.len()];
+    let mut heap = BinaryHeap::from([Reverse((0_u64, start))]);
+    best[start] = 0.0;
+    while let Some(Reverse((bits, v))) = heap.pop() {
+        if f64::from_bits(bits) > best[v] {
+            continue;
+        }
+        for w in around[v].iter().map(|w| *w as usize) {
+            let length = best[v] + (points[w] - points[v]).norm();
+            if length < best[w] {
+                best[w] = length;
+                // Distances are not negative, so their bits are in order.
+                heap.push(Reverse((length.to_bits(), w)));
+            }
+        }
+    }
+    best
+}
+
+fn farthest(distance: &[f64]) -> usize {
+    let finite = (0..distance.len()).filter(|v| distance[*v].is_finite());
+    finite.max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a))).unwrap_or(0)
+}
+
+/// Smoothed distances from a far end of the largest part; infinite elsewhere.
+fn surface_distance(points: &[Point], around: &[Vec<u32>]) -> Vec<f64> {
+    let mut seen = vec![false; points.len()];
+    let mut largest = (0, 0);
+    for start in (0..points.len()).filter(|v| !around[*v].is_empty()) {
+        if !seen[start] {
+            let of_part = along_edges(points, around, start);
+            let count = of_part.iter().filter(|d| d.is_finite()).count();
+            seen.iter_mut().zip(&of_part).for_each(|(s, d)| *s |= d.is_finite());
+            largest = largest.max((count, start));
+        }
+    }
+    let from = farthest(&along_edges(points, around, largest.1));
+    let mut distance = along_edges(points, around, from);
+    for _ in 0..SMOOTHING {
+        let old = distance.clone();
+        for (v, near) in around.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
+            let sum: f64 = near.iter().map(|w| old[*w as usize]).sum();
+            distance[v] = 0.5 * (old[v] + sum / near.len() as f64);
+        }
+    }
+    distance
+}
+
+/// A graph while it is thinned out.
+#[derive(Debug, Default)]
+struct Graph {
+    points: Vec<Point>,
+    edges: BTreeSet<(usize, usize)>,
+}
+
+impl Graph {
+    fn link(&mut self, a: usize, b: usize) {
+        if a != b {
+            self.edges.insert((a.min(b), a.max(b)));
+        }
+    }
+
+    fn around(&self) -> Vec<Vec<usize>> {
+        let mut found = vec![Vec::new(); self.points.len()];
+        for &(a, b) in &self.edges {
+            found[a].push(b);
+            found[b].push(a);
+        }
+        found
+    }
+}
+
+/// The middles of the connected parts of bands, linked where they touch.
+fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64]) -> Graph {
+    let far = distance.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
+    // No edge may reach past the next band, or a ring falls apart.
+    let reach =
+        |v: usize| around[v].iter().map(|w| (distance[v] - distance[*w as usize]).abs()).fold(0.0, f64::max);
+    let finite = (0..points.len()).filter(|v| distance[*v].is_finite());
+    let width = finite.map(reach).fold(far / BANDS, f64::max).max(1e-300);
+    let band = |v: usize| (distance[v] / width).floor() as usize;
+    let mut ring = vec![usize::MAX; points.len()];
+    let mut graph = Graph::default();
+    let in_part = |v: usize| distance[v].is_finite() && !around[v].is_empty();
+    for start in (0..points.len()).filter(|v| in_part(*v)) {
+        if ring[start] != usize::MAX {
+            continue;
+        }
+        let at = graph.points.len();
+        let (mut stack, mut sum, mut count) = (vec![start], Point::zeros(), 0.0);
+        ring[start] = at;
+        while let Some(v) = stack.pop() {
+            (sum, count) = (sum + points[v], count + 1.0);
+            for w in around[v].iter().map(|w| *w as usize) {
+                if ring[w] == usize::MAX && band(w) == band(start) {
+                    ring[w] = at;
+                    stack.push(w);
+                }
+            }
+        }
+        graph.points.push(sum / count);
+    }
+    for (v, near) in around.iter().enumerate().filter(|(v, _)| in_part(*v)) {
+        for w in near {
+            graph.link(ring[v], ring[*w as usize]);
+        }
+    }
+    graph
+}
+
+/// Cuts off ends in corners of the surface: what is much nearer to it than its neighbour.
+fn trim(skin: &Skin, graph: &mut Graph) {
+    let depth: Vec<f64> = graph.points.iter().map(|p| skin.depth(p)).collect();
+    loop {
+        let around = graph.around();
+        let end = |i: &usize| match around[*i][..] {
+            [next] => depth[*i] < 0.8 * depth[next],
+            _ => false,
+        };
+        let Some(i) = (0..around.len()).find(end).filter(|_| graph.edges.len() > 2) else { return };
+        let next = around[i][0];
+        graph.edges.remove(&(i.min(next), i.max(next)));
+    }
+}
+
+/// Smooths limbs and leaves out what lies on a straight line between its neighbours.
+fn thin(skin: &Skin, mut graph: Graph) -> Graph {
+    trim(skin, &mut graph);
+    let around = graph.around();
+    for _ in 0..2 {
+        let old = graph.points.clone();
+        for (i, near) in around.iter().enumerate() {
+            if let [a, b] = near[..] {
+                graph.points[i] = old[i] * 0.5 + (old[a] + old[b]) * 0.25;
+            }
+        }
+    }
+    loop {
+        let around = graph.around();
+        let straight = |i: &usize| {
+            let [a, b] = around[*i][..] else { return false };
+            let (p, q, x) = (graph.points[a], graph.points[b], graph.points[*i]);
+            let u = q - p;
+            let t = ((x - p).dot(&u) / u.norm_squared().max(1e-300)).clamp(0.0, 1.0);
+            let radius = skin.depth(&x);
+            let bends = (p + u * t - x).norm() > STRAIGHT * radius;
+            // Two ways between the same nodes are a loop and stay one.
+            !bends && u.norm() < 8.0 * radius.abs() && !graph.edges.contains(&(a.min(b), a.max(b)))
+        };
+        // Every other one at most, so that a bend is not used up step by step.
+        let mut taken = vec![false; graph.points.len()];
+        let mut out = Vec::new();
+        for i in 0..graph.points.len() {
+            if straight(&i) && !around[i].iter().any(|k| taken[*k]) {
+                taken[i] = true;
+                out.push(i);
+            }
+        }
+        if out.is_empty() {
+            return compact(graph);
+        }
+        for i in out {
+            let [a, b] = around[i][..] else { continue };
+            graph.edges.remove(&(a.min(i), a.max(i)));
+            graph.edges.remove(&(b.min(i), b.max(i)));
+            graph.link(a, b);
+        }
+    }
+}
+
+/// Without nodes that nothing is linked to.
+fn compact(graph: Graph) -> Graph {
+    let around = graph.around();
+    let kept: Vec<usize> = (0..around.len()).filter(|i| !around[*i].is_empty()).collect();
+    let place = |i: usize| kept.binary_search(&i).unwrap_or(0);
+    Graph {
+        points: kept.iter().map(|i| graph.points[*i]).collect(),
+        edges: graph.edges.iter().map(|(a, b)| (place(*a), place(*b))).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::shapes::square_tube;
+
+    #[test]
+    fn a_bar_has_a_straight_line_through_its_middle() {
+        let rings: Vec<(f64, f64)> = (0..31).map(|i| (f64::from(i) / 3.0, 0.6)).collect();
+        let (vertices, faces) = square_tube(&rings);
+        let found = extract_skeleton(&vertices, &faces).expect("a line");
+        assert!(found.nodes.iter().all(|p| p.y.abs() < 0.2 && p.z.abs() < 0.2), "off the middle");
+        let length: f64 = found
+            .edges
+            .iter()
+            .map(|[a, b]| (found.nodes[*a as usize] - found.nodes[*b as usize]).norm())
+            .sum();
+        assert!((8.0..10.5).contains(&length), "{length}");
+        assert_eq!(found.edges.len() + 1, found.nodes.len());
+    }
+
+    #[test]
+    fn a_ring_of_rings_keeps_its_loop() {
+        let (vertices, faces) = crate::fixtures::shapes::torus(60, 12, 1.0, 0.25);
+        let found = extract_skeleton(&vertices, &faces).expect("a loop");
+        assert_eq!(found.edges.len(), found.nodes.len(), "one loop");
+        for p in &found.nodes {
+            assert!((p.xy().norm() - 1.0).abs() < 0.2 && p.z.abs() < 0.1, "{p}");
+        }
+    }
+}
