@@ -31,6 +31,7 @@ lint: $(VENV)/.core
 
 bench: $(VENV)/.extension
 	$(PY) tools/with_extension.py tests/bench/bench_blender.py
+	$(PY) tests/bench/bench_caging.py
 	cargo bench --quiet -p cage_rig --bench skinning --bench binding
 
 fixtures: $(VENV)/.extension
