@@ -136,7 +136,7 @@ def test_nothing_below_knows_the_cage_generator() -> None:
     for folder in ("coordinates", "skinning", "sync", "geometry"):
         for path, named in uses(folder).items():
             assert "caging" not in named, path
-    below = {"cage", "caging", "coordinates", "error", "fixtures", "geometry", "linalg", "mesh", "points", "rows"}
+    below = {"cage", "caging", "error", "fixtures", "geometry", "mesh", "points", "progress"}
     assert uses("caging")
     for path, named in uses("caging").items():
         assert named <= below, path

@@ -23,9 +23,9 @@ __all__ = [
     "CageError",
     "CageGenerator",
     "CageRigError",
-    "Cancelled",
     "CagingError",
     "CagingJob",
+    "Cancelled",
     "CoupledRig",
     "MethodJob",
     "PanicException",
@@ -305,6 +305,7 @@ def cage_sections(
     options: CagingOptions | None = None,
 ) -> list[Section]: ...
 def extract_skeleton(vertices: ArrayLike, faces: Faces) -> tuple[Doubles, NDArray[np.int64]]: ...  # nodes, edges
+
 @final
 class CagingJob:
     """A cage generated in a thread of its own: takes what generate_cage takes, and begins at once."""

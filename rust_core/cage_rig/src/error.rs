@@ -213,7 +213,7 @@ pub enum CagingError {
     FewCorners { face: usize, corners: usize },
     #[error("skin face {face} uses vertex {vertex}, but the skin has {vertices} vertices")]
     BadIndex { face: usize, vertex: i64, vertices: usize },
-    #[error("skin vertex {vertex} has a coordinate that is not finite")]
+    #[error("skin vertex {vertex} has a coordinate that is not finite or beyond 1e12")]
     SkinNotFinite { vertex: usize },
     #[error("the skin is open at edge {a}-{b}, near {}; close it, or cage a voxel-remeshed copy", at(.place))]
     OpenSkin { a: usize, b: usize, place: Point },
@@ -225,13 +225,13 @@ pub enum CagingError {
     NoVolume,
     #[error("the skeleton has no nodes or no edges")]
     SkeletonEmpty,
-    #[error("skeleton node {node} has a coordinate that is not finite")]
+    #[error("skeleton node {node} has a coordinate that is not finite or beyond 1e12")]
     NodeNotFinite { node: usize },
     #[error("skeleton edge {edge} names node {node}, but there are {nodes} nodes")]
     BadEdge { edge: usize, node: i64, nodes: usize },
     #[error("no part of the skeleton is inside the skin")]
     SkeletonOutside,
-    #[error("bending node {row} has a coordinate that is not finite")]
+    #[error("bending node {row} has a coordinate that is not finite or beyond 1e12")]
     BendingNotFinite { row: usize },
     #[error("the skeleton is too short for a cage: it has {sections} cross sections and needs at least 2")]
     TooFewSections { sections: usize },

@@ -8,7 +8,7 @@
 use super::skeleton::{climb, Arc, CurveSkeleton};
 use super::skin::Skin;
 use crate::error::CagingError;
-use crate::points::{first_not_finite, Point};
+use crate::points::{first_unusable, Point};
 
 /// How bending nodes are placed where the user gives none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,7 +53,7 @@ pub(crate) fn control_nodes(
 ) -> Result<Vec<ControlNode>, CagingError> {
     let mut given = vec![Vec::new(); skeleton.arcs.len()];
     if let Some(bending) = bending {
-        if let Some(row) = first_not_finite(bending) {
+        if let Some(row) = first_unusable(bending) {
             return Err(CagingError::BendingNotFinite { row });
         }
         for p in bending {

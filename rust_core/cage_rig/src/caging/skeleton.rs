@@ -8,7 +8,7 @@
 
 use super::skin::Skin;
 use crate::error::CagingError;
-use crate::points::{first_not_finite, Point};
+use crate::points::{first_unusable, Point};
 use rayon::prelude::*;
 
 /// Depth below which a node counts as outside, relative to the size.
@@ -145,7 +145,7 @@ fn read(skin: &Skin, nodes: &[Point], edges: &[[i64; 2]]) -> Result<Graph, Cagin
     if nodes.is_empty() || edges.is_empty() {
         return Err(CagingError::SkeletonEmpty);
     }
-    if let Some(node) = first_not_finite(nodes) {
+    if let Some(node) = first_unusable(nodes) {
         return Err(CagingError::NodeNotFinite { node });
     }
     for (edge, ends) in edges.iter().enumerate() {

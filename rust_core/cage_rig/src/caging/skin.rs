@@ -7,7 +7,7 @@
 use crate::error::CagingError;
 use crate::geometry::bvh::Bvh;
 use crate::mesh::{triangulate, FaceFault, Polygons};
-use crate::points::{bounding_diagonal, first_not_finite, Point};
+use crate::points::{bounding_diagonal, first_unusable, Point};
 use std::collections::HashMap;
 
 /// A closed skin ready to be asked about inside, nearest points and boxes.
@@ -63,7 +63,7 @@ impl Skin {
         if faces.is_empty() || vertices.is_empty() {
             return Err(CagingError::SkinEmpty);
         }
-        if let Some(vertex) = first_not_finite(vertices) {
+        if let Some(vertex) = first_unusable(vertices) {
             return Err(CagingError::SkinNotFinite { vertex });
         }
         let pieces = triangulate(vertices, faces).map_err(|fault| match fault {
