@@ -83,7 +83,7 @@ fn floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Bl
 
 fn finite_floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Block<f64>> {
     let block = floats(value, argument, shape)?;
-    match block.data.iter().position(|x| !(x.abs() <= cage_rig::LARGEST)) {
+    match block.data.iter().position(|x| x.is_nan() || x.abs() > cage_rig::LARGEST) {
         None => Ok(block),
         Some(at) => {
             let width: usize = block.shape[1..].iter().product();
