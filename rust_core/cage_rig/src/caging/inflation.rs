@@ -135,7 +135,7 @@ impl<'a> Inflation<'a> {
             goal = target(t);
             // Where shape and skin can't agree, the cage yields: its present shape is the rest shape.
             let rest_shape = if softened > 0 { self.cage.clone() } else { goal.clone() };
-            self.relax(&mut around, &obstacle, &rest_shape, &weights, if pressed { 6 } else { 3 });
+            self.relax(&mut around, &obstacle, &rest_shape, &weights, (if pressed { 6 } else { 3 }, STEP));
             if t >= 1.0 && weights.least >= 0.999 * least {
                 return Ok(Ok(()));
             }
@@ -176,11 +176,11 @@ impl<'a> Inflation<'a> {
     ) -> Result<(), Cancelled> {
         let body = Body::new(rest, triangles);
         let mut reach = options.reach;
-        let mut stiffness = 0.3;
+        let (mut stiffness, mut limit) = (0.3, STEP);
         for round in 0..options.rounds {
             progress.reach(round as f64 / options.rounds as f64)?;
             self.body.tree.refit(&self.cage);
-            let reached = reach + options.clearance + 2.0 * STEP;
+            let reached = reach + options.clearance + 2.0 * limit;
             let mut around = Surroundings::of(&self.body, &body, &self.cage, rest, reached);
             let weights = Weights {
                 shape: stiffness,
@@ -191,7 +191,8 @@ impl<'a> Inflation<'a> {
                 least: options.clearance.min(0.5 * around.narrowest()),
             };
             let here = self.cage.clone();
-            let moved = self.relax(&mut around, rest, &here, &weights, 2);
+            let moved = self.relax(&mut around, rest, &here, &weights, (2, limit));
+            limit = (3.0 * moved).clamp(0.1 * STEP, STEP);
             if round % 8 == 7 {
                 reach = (0.6 * reach).max(4.0 * options.clearance);
                 stiffness = (0.5 * stiffness).max(0.05);
@@ -203,18 +204,18 @@ impl<'a> Inflation<'a> {
         Ok(())
     }
 
-    /// Newton steps toward `goal`, none longer than a step together. How far anything moved.
+    /// Some Newton steps toward `goal`, together no longer than `limit`. How far anything moved.
     fn relax(
         &mut self,
         around: &mut Surroundings,
         obstacle: &[Point],
         goal: &[Point],
         weights: &Weights,
-        rounds: usize,
+        (rounds, limit): (usize, f64),
     ) -> f64 {
         let edges = std::mem::take(&mut self.edges);
         let shape = Shape { faces: &self.faces, edges: &edges, rest: goal, mirror: self.mirror };
-        let mut left = STEP;
+        let mut left = limit;
         for _ in 0..rounds {
             let points = Points { cage: &self.cage, obstacle };
             let found = around.within(weights.least + weights.reach + 2.0 * left);
@@ -245,7 +246,7 @@ impl<'a> Inflation<'a> {
             }
         }
         self.edges = edges;
-        STEP - left
+        limit - left
     }
 }
 

@@ -116,7 +116,7 @@ pub struct GeneratedCage {
 
 /// Why one attempt at a cage failed.
 enum Failure {
-    /// No cage closes around this junction.
+    /// No start is free of crossings at this junction.
     Junction(usize, CagingError),
     Other(CagingError),
 }
@@ -183,7 +183,7 @@ impl Generator {
     /// out where no cage closes around their branching node, and thin ones (fingers) where no cage
     /// can be grown around them; the report names their nodes as dropped.
     pub fn generate(&self, bending: Option<&[Point]>, part: &Part) -> Result<GeneratedCage, CagingError> {
-        let first = self.generate_with(self.skeleton.clone(), bending, part);
+        let first = self.generate_with(self.skeleton.clone(), self.options.detail, bending, part);
         let fingers = |fault: &CagingError| bending.is_none() && fault.is_of_growth();
         if !first.as_ref().is_err_and(fingers) {
             return first;
@@ -193,7 +193,7 @@ impl Generator {
             let coarser = curve_skeleton(&self.skin, &self.graph.0, &self.graph.1, detail, &[])?;
             if coarser.arcs.len() < arcs {
                 arcs = coarser.arcs.len();
-                match self.generate_with(coarser, bending, part) {
+                match self.generate_with(coarser, detail, bending, part) {
                     Err(fault) if fault.is_of_growth() => {}
                     found => return found,
                 }
@@ -206,6 +206,7 @@ impl Generator {
     fn generate_with(
         &self,
         mut skeleton: CurveSkeleton,
+        detail: f64,
         bending: Option<&[Point]>,
         part: &Part,
     ) -> Result<GeneratedCage, CagingError> {
@@ -216,12 +217,10 @@ impl Generator {
                 Err(Failure::Other(fault)) => return Err(fault),
                 Err(Failure::Junction(junction, fault)) => (junction, fault),
             };
-            let Some(tip) = skeleton.least_leaf(junction).filter(|_| without.len() < CUTS) else {
-                return Err(fault);
-            };
+            let cut = skeleton.least_leaf(junction).filter(|_| bending.is_none() && without.len() < CUTS);
+            let Some(tip) = cut else { return Err(fault) };
             without.push(tip);
-            skeleton =
-                curve_skeleton(&self.skin, &self.graph.0, &self.graph.1, self.options.detail, &without)?;
+            skeleton = curve_skeleton(&self.skin, &self.graph.0, &self.graph.1, detail, &without)?;
         }
     }
 
@@ -296,7 +295,9 @@ impl Generator {
                 Err(vertex) => {
                     let at = joined.owner[vertex];
                     let place = self.skin.space.leave(&joined.centers[at]);
-                    fault = CagingError::NoStart { node: nodes[at].node, place }.into();
+                    let ends = skeleton.arcs[nodes[at].arc].ends;
+                    let junction = ends[usize::from(skeleton.junctions[ends[0]].degree == 1)];
+                    fault = Failure::Junction(junction, CagingError::NoStart { node: nodes[at].node, place });
                 }
             }
         }

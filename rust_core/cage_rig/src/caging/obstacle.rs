@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 /// Triangles that growth is quick with.
 const MANY: usize = 9000;
-const FEW: usize = 4000;
+const FEW: usize = 2000;
 
 /// Vertices and triangles, unit space.
 #[derive(Debug, Clone, Default)]
