@@ -265,6 +265,10 @@ class Section(TypedDict):
     ring: Doubles  # (n, 3)
     corners: Doubles  # (corners, 3)
 
+class Arc(TypedDict):
+    path: Doubles  # (n, 3)
+    nodes: NDArray[np.int64]  # (n,), of the skeleton handed in, -1 between them
+
 class Repairs(TypedDict):
     welded: int
     left_out: int
@@ -347,3 +351,7 @@ class CageGenerator:
     ) -> CageGenerator: ...
     def sections(self, bending_nodes: ArrayLike | None = None) -> list[Section]: ...
     def generate(self, bending_nodes: ArrayLike | None = None) -> CagingJob: ...
+    @property
+    def arcs(self) -> list[Arc]: ...  # the skeleton as it is used: clipped, recentred, pruned
+    @property
+    def repairs(self) -> Repairs: ...

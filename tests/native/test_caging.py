@@ -124,3 +124,17 @@ def test_an_inside_out_skin_is_turned(tube):
     turned = corners.reshape(-1, 4)[:, ::-1].ravel()
     _, _, report = core.generate_cage(skin, (turned, sizes), nodes, edges)
     assert report["repairs"]["inside_out"]
+
+
+def test_a_generator_tells_the_skeleton_that_it_uses(tube):
+    skin, faces, nodes, edges = tube
+    nodes = np.concatenate([nodes, [[5.0, 30.0, 0]]])  # a bone that leads outside
+    edges = np.concatenate([edges, [[1, 3]]])
+    generator = core.CageGenerator(skin, faces, nodes, edges)
+    named = np.concatenate([arc["nodes"] for arc in generator.arcs])
+    assert {0, 1, 2} <= set(named.tolist())
+    assert 3 not in named
+    for arc in generator.arcs:
+        assert len(arc["path"]) == len(arc["nodes"])
+        assert np.ptp(arc["path"][:, 1:]) < 0.1
+    assert generator.repairs["parts"] == 1

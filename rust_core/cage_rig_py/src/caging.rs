@@ -4,7 +4,7 @@ use crate::arrays;
 use crate::errors::{cancelled, CageRigError, OrRaise};
 use crate::jobs::Job;
 use cage_rig::caging::{
-    CageReport, CagingOptions, GeneratedCage, Generator, NodeKind, Placement, SectionReport,
+    CageReport, CagingOptions, GeneratedCage, Generator, NodeKind, Placement, Repairs, SectionReport,
 };
 use cage_rig::{CagingError, Error, Point, Polygons, Progress};
 use numpy::{PyArray1, PyArrayMethods};
@@ -155,6 +155,26 @@ impl CageGenerator {
         section_list(py, &found)
     }
 
+    /// The skeleton as it is used, arc after arc.
+    #[getter]
+    fn arcs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let list = PyList::empty(py);
+        for arc in self.0.arcs() {
+            let entry = PyDict::new(py);
+            entry.set_item("path", arrays::from_points(py, &arc.path)?)?;
+            let nodes = arc.nodes.iter().map(|node| node.map_or(-1, |node| node as i64));
+            entry.set_item("nodes", PyArray1::from_iter(py, nodes))?;
+            list.append(entry)?;
+        }
+        Ok(list)
+    }
+
+    /// What was done to the skin.
+    #[getter]
+    fn repairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        repairs_dict(py, &self.0.repairs())
+    }
+
     /// Begins the cage in a thread of its own.
     #[pyo3(signature = (bending_nodes=None))]
     fn generate(&self, bending_nodes: Option<&Bound<'_, PyAny>>) -> PyResult<CagingJob> {
@@ -263,13 +283,7 @@ fn report_dict<'py>(py: Python<'py>, report: &CageReport) -> PyResult<Bound<'py,
     let owners: Vec<i64> = report.vertex_sections.iter().map(|s| *s as i64).collect();
     found.set_item("vertex_sections", PyArray1::from_vec(py, owners))?;
     found.set_item("dropped_nodes", report.dropped.clone())?;
-    let repairs = PyDict::new(py);
-    repairs.set_item("welded", report.repairs.welded)?;
-    repairs.set_item("left_out", report.repairs.left_out)?;
-    repairs.set_item("turned", report.repairs.turned)?;
-    repairs.set_item("inside_out", report.repairs.inside_out)?;
-    repairs.set_item("parts", report.repairs.parts)?;
-    found.set_item("repairs", repairs)?;
+    found.set_item("repairs", repairs_dict(py, &report.repairs)?)?;
     found.set_item("volume_ratio", report.volume_ratio)?;
     found.set_item("mean_distance", report.mean_distance)?;
     found.set_item("clearance", report.clearance)?;
@@ -282,6 +296,16 @@ fn report_dict<'py>(py: Python<'py>, report: &CageReport) -> PyResult<Bound<'py,
         timings.set_item(stage, seconds)?;
     }
     found.set_item("timings", timings)?;
+    Ok(found)
+}
+
+fn repairs_dict<'py>(py: Python<'py>, repairs: &Repairs) -> PyResult<Bound<'py, PyDict>> {
+    let found = PyDict::new(py);
+    found.set_item("welded", repairs.welded)?;
+    found.set_item("left_out", repairs.left_out)?;
+    found.set_item("turned", repairs.turned)?;
+    found.set_item("inside_out", repairs.inside_out)?;
+    found.set_item("parts", repairs.parts)?;
     Ok(found)
 }
 

@@ -27,7 +27,7 @@ mod verify;
 pub use control_nodes::{NodeKind, Placement};
 pub use extraction::{extract_skeleton, ExtractedSkeleton};
 pub use inflation::InflationOptions;
-pub use report::{CageReport, Laps, SectionReport};
+pub use report::{ArcReport, CageReport, Laps, SectionReport};
 pub use sections::SectionOptions;
 pub use skin::{Repairs, Skin};
 
@@ -158,6 +158,16 @@ impl Generator {
     ) -> Result<Vec<SectionReport>, CagingError> {
         let (nodes, sections, _) = self.cross_sections(&self.skeleton, bending, part)?;
         Ok(report::sections(&self.skin, &nodes, &sections))
+    }
+
+    /// The skeleton as it is used: clipped, recentred and pruned, arc after arc.
+    pub fn arcs(&self) -> Vec<ArcReport> {
+        report::arcs(&self.skin, &self.skeleton)
+    }
+
+    /// What was done to the skin.
+    pub fn repairs(&self) -> Repairs {
+        self.skin.repairs
     }
 
     fn cross_sections(

@@ -2,6 +2,7 @@
 
 use super::control_nodes::{ControlNode, NodeKind};
 use super::sections::Section;
+use super::skeleton::CurveSkeleton;
 use super::skin::{Repairs, Skin};
 use super::tubes::Scaffold;
 use crate::geometry::bvh::Bvh;
@@ -32,6 +33,15 @@ pub struct SectionReport {
 /// Stages with their seconds.
 pub type Laps = Vec<(&'static str, f64)>;
 
+/// A part of the skeleton between two of its ends and branching nodes, in the user's space.
+#[derive(Debug, Clone)]
+pub struct ArcReport {
+    /// Points along it.
+    pub path: Vec<Point>,
+    /// For each, the node of the skeleton that was handed in, where it is one.
+    pub nodes: Vec<Option<usize>>,
+}
+
 /// How a cage came about and how good it is.
 #[derive(Debug, Clone)]
 pub struct CageReport {
@@ -57,6 +67,12 @@ pub struct CageReport {
     pub genus: i64,
     /// Seconds by stage.
     pub timings: Laps,
+}
+
+pub(super) fn arcs(skin: &Skin, skeleton: &CurveSkeleton) -> Vec<ArcReport> {
+    let leave = |path: &[Point]| path.iter().map(|p| skin.space.leave(p)).collect();
+    let arcs = skeleton.arcs.iter();
+    arcs.map(|arc| ArcReport { path: leave(&arc.path), nodes: arc.nodes.clone() }).collect()
 }
 
 pub(super) fn sections(skin: &Skin, nodes: &[ControlNode], found: &[Section]) -> Vec<SectionReport> {
