@@ -88,3 +88,11 @@ def call(operator: Any, **options: Any) -> set[str]:
     """Call an operator with those of the options that this Blender's version of it has."""
     known = operator.get_rna_type().properties
     return operator(**{name: value for name, value in options.items() if name in known})
+
+
+def select_only_bone(obj: bpy.types.Object, name: str) -> None:
+    """Select one bone of an armature object and make it active; from 5.0 on pose bones are what is selected."""
+    poses = "select" in bpy.types.PoseBone.bl_rna.properties
+    for bone in obj.pose.bones:
+        (bone if poses else bone.bone).select = bone.name == name
+    obj.data.bones.active = obj.data.bones[name]

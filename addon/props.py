@@ -227,6 +227,39 @@ class CageRigOverlays(bpy.types.PropertyGroup):
     )
 
 
+class CageRigBendingNode(bpy.types.PropertyGroup):
+    """Where a generated cage gets a cross section. `name` is the bone's name."""
+
+    name: StringProperty(name="Bone")
+    position: FloatProperty(
+        name="Position",
+        description="Along the bone, 0 at its head and 1 at its tail; down to -1 on the way from its parent to it",
+    )
+
+
+class CageRigCaged(bpy.types.PropertyGroup):
+    """A skin that a cage was generated around."""
+
+    object: PointerProperty(type=bpy.types.Object, name="Skin")
+
+
+class CageRigGenerated(bpy.types.PropertyGroup):
+    """How a cage was generated, on its object: `object.cage_rig_generated`. Not the rig's, so that Unbind keeps it."""
+
+    armature: PointerProperty(type=bpy.types.Object, name="Armature")
+    skins: CollectionProperty(type=CageRigCaged, name="Skins")
+    own_nodes: BoolProperty(name="Own Nodes", description="Whether the artist has chosen the bending nodes")
+    nodes: CollectionProperty(type=CageRigBendingNode, name="Bending Nodes")
+    placement: StringProperty(default="AUTOMATIC")
+    corners: IntProperty(default=4)
+    triangles: BoolProperty()
+    clearance: FloatProperty(default=3e-4)
+    tightness: FloatProperty(default=1.0)
+    detail: FloatProperty()
+    symmetry: BoolProperty(default=True)
+    hull: BoolProperty()
+
+
 def rig_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     """The rest cage of the rig that `obj` is part of: cage, skin, posed cage, refit bones or armature."""
     if obj is None:
@@ -238,18 +271,29 @@ def rig_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:
     return obj.cage_rig.owner
 
 
-CLASSES = (CageRigJoint, CageRigSuspended, CageRigSkin, CageRigSettings, CageRigOverlays)
+CLASSES = (
+    CageRigJoint,
+    CageRigSuspended,
+    CageRigSkin,
+    CageRigSettings,
+    CageRigOverlays,
+    CageRigBendingNode,
+    CageRigCaged,
+    CageRigGenerated,
+)
 
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Object.cage_rig = PointerProperty(type=CageRigSettings, name="Cage Rig", override=OVERRIDABLE)
+    bpy.types.Object.cage_rig_generated = PointerProperty(type=CageRigGenerated, name="Generated Cage")
     bpy.types.WorkSpace.cage_rig_overlays = PointerProperty(type=CageRigOverlays, name="Cage Rig Overlays")
 
 
 def unregister() -> None:
     del bpy.types.WorkSpace.cage_rig_overlays
+    del bpy.types.Object.cage_rig_generated
     del bpy.types.Object.cage_rig
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -55,6 +55,21 @@ def read(
     return Character(rest, parts, to_rig)
 
 
+def read_meshes(skins: list[bpy.types.Object]) -> list[tuple[positions.Points, tuple]]:
+    """Base meshes without weights, in the space of the first object: points and faces. Raises `BindError`."""
+    world = armature.to_array(skins[0].matrix_world)
+    for obj in skins:
+        if not obj.data.polygons:
+            raise BindError(f"'{obj.name}' has no faces, so it can't be a skin")
+    return [
+        (
+            positions.apply_matrix(_to_rig(obj, world, skins[0].name), positions.read_base(obj.data)),
+            positions.read_faces(obj.data),
+        )
+        for obj in skins
+    ]
+
+
 def _to_rig(obj: bpy.types.Object, armature_world: Matrix, armature_name: str) -> Matrix:
     world = armature.to_array(obj.matrix_world)
     for name, matrix in ((armature_name, armature_world), (obj.name, world)):

@@ -48,6 +48,35 @@ def to_bind(
     return cage, armatures[0], [obj for obj in meshes if obj != cage]
 
 
+def to_generate(
+    context: bpy.types.Context,
+) -> tuple[bpy.types.Object | None, bpy.types.Object | None, list[bpy.types.Object]]:
+    """A generated cage that is to be made anew, or None; the armature, if there is one; the skins. From the selection.
+
+    What the selection lacks is taken from the cage, or from the skins' Armature modifiers. Raises `BindError`.
+    """
+    selected = context.selected_objects
+    meshes = [obj for obj in selected if obj.type == "MESH"]
+    cages = [obj for obj in meshes if len(obj.cage_rig_generated.skins) or obj.cage_rig.state != "NONE"]
+    if len(cages) > 1:
+        raise BindError(f"'{cages[0].name}' and '{cages[1].name}' are cages; select one of them")
+    cage = next(iter(cages), None)
+    kept = cage.cage_rig_generated if cage is not None else None
+    skins = [obj for obj in meshes if obj != cage and obj.cage_rig.part != "POSED_CAGE"]
+    if not skins and kept is not None:
+        skins = [item.object for item in kept.skins if item.object is not None and item.object.users_collection]
+    if not skins:
+        raise BindError("Select the skin meshes that the cage is to enclose, and their armature")
+    armatures = [obj for obj in selected if obj.type == "ARMATURE" and obj.cage_rig.part == "NONE"]
+    if not armatures:
+        armatures = list({mod.object for obj in skins for mod in obj.modifiers if mod.type == "ARMATURE"} - {None})
+    if not armatures and kept is not None and kept.armature is not None:
+        armatures = [kept.armature]
+    if len(armatures) > 1:
+        raise BindError(f"Select one armature with the skins; {len(armatures)} are meant")
+    return cage, next(iter(armatures), None), skins
+
+
 def _cage_among(meshes: list[bpy.types.Object], active: bpy.types.Object | None) -> bpy.types.Object:
     enclosing = [obj for obj in meshes if all(other == obj or _encloses(obj, other) for other in meshes)]
     if len(enclosing) == 1:

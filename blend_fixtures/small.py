@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .bar import bar, box_cage, joint_weights
-from .fields import ellipsoid
+from .fields import cone, ellipsoid
 from .parts import Array, Bone, Cage, Character, Skin
 from .surface_nets import mesh_field
 
@@ -21,7 +21,7 @@ def two_skins() -> Character:
     whole = bar(segments=24, across=6)
     skin = whole.skins[0]
     middle = skin.vertices[skin.faces].mean(axis=1)[:, 0]
-    halves = [_part_of(skin, "Left", middle < 0.0), _part_of(skin, "Right", middle >= 0.0)]
+    halves = [part_of(skin, "Left", middle < 0.0), part_of(skin, "Right", middle >= 0.0)]
     return Character("TwoSkins", halves, whole.bones, whole.cage)
 
 
@@ -41,6 +41,22 @@ def two_roots() -> Character:
     return Character("TwoRoots", [skin], bones, box_cage((-1.2, -0.4, 0.4, 1.2), half=0.55))
 
 
+def capsule() -> Character:
+    """A round bar with two bones in it, and a box as its cage: the simplest limb."""
+    skin, faces = mesh_field(
+        cone((-0.75, 0.0, 0.0), (0.75, 0.0, 0.0), 0.25),
+        np.array([-1.1, -0.4, -0.4]),
+        np.array([1.1, 0.4, 0.4]),
+        cell=0.05,
+    )
+    bones = [
+        Bone("lower", (-0.8, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        Bone("upper", (0.0, 0.0, 0.0), (0.8, 0.0, 0.0), "lower", connected=True),
+    ]
+    cage = box_cage((-1.15, -0.4, 0.4, 1.15), half=0.35)
+    return Character("Capsule", [Skin("Capsule", skin, faces, joint_weights(skin[:, 0]))], bones, cage)
+
+
 def octahedron_cage(center: Array, radius: float) -> Cage:
     """The smallest cage that tests use: six vertices, eight triangles, outward."""
     offsets = np.concatenate([np.eye(3), -np.eye(3)]) * radius
@@ -48,7 +64,7 @@ def octahedron_cage(center: Array, radius: float) -> Cage:
     return Cage(np.asarray(center, float) + offsets, faces)
 
 
-def _part_of(skin: Skin, name: str, keep: Array) -> Skin:
+def part_of(skin: Skin, name: str, keep: Array) -> Skin:
     """The faces `keep` (#F booleans) of `skin` as a skin of their own."""
     used, inverse = np.unique(skin.faces[keep], return_inverse=True)
     return Skin(name, skin.vertices[used], inverse.reshape(-1, 4), skin.weights[used], skin.materials)

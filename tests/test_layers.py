@@ -30,6 +30,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"bpy", "numpy"},
         {"adapters", "binding", "choosing", "health", "layers", "linked", "registry", "session", "skins"},
     ),
+    "generator": ({"cage_rig_core", "numpy"}, set()),
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "installation": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "session", "sync"}),
     "lifecycle": (
@@ -40,6 +41,10 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"bpy", "mathutils", "numpy", "pathlib", "shutil", "struct"},
         {"adapters", "bake", "compat", "health", "layers", "registry", "session", "skins", "sync"},
     ),
+    "caging": ({"bpy", "mathutils", "numpy"}, {"adapters", "caging", "compat", "generator", "reading"}),
+    "caging/bones": ({"numpy"}, set()),
+    "caging/course": ({"numpy"}, {"caging", "generator"}),
+    "caging/editing": ({"numpy"}, {"caging", "generator"}),
     "exchange": ({"numpy", "pathlib", "zipfile"}, {"exchange"}),
     "exchange/__init__": ({"bpy"}, {"exchange"}),
     "exchange/live": (
@@ -57,12 +62,25 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "handlers": ({"bpy"}, {"sync"}),
     "operators": (
         {"bpy"},
-        {"bake", "choosing", "exchange", "keying", "lifecycle", "operators", "props", "repair", "samples", "selection"},
+        {
+            "bake",
+            "caging",
+            "choosing",
+            "exchange",
+            "keying",
+            "lifecycle",
+            "operators",
+            "props",
+            "repair",
+            "samples",
+            "selection",
+        },
     ),
-    "ui": ({"bpy"}, {"choosing", "keying", "props", "repair", "ui"}),
+    "operators/node_events": ({"bpy", "numpy"}, {"caging", "generator", "operators"}),
+    "ui": ({"bpy"}, {"caging", "choosing", "keying", "props", "repair", "ui"}),
     "ui/overlays": (
         {"blf", "bpy", "gpu", "gpu_extras", "mathutils", "numpy"},
-        {"adapters", "health", "props", "registry", "session", "sync", "ui"},
+        {"adapters", "caging", "health", "props", "registry", "session", "sync", "ui"},
     ),
     "headless": (
         {"argparse", "bpy", "json", "mathutils", "numpy", "pathlib", "sys", "time", "zipfile"},

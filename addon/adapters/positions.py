@@ -95,8 +95,14 @@ def read_faces(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int3
 
 def new_mesh(name: str, points: Points, faces: tuple[NDArray[np.int32], NDArray[np.int32]]) -> bpy.types.Mesh:
     """A new mesh datablock from `#V by 3` points and (corners, sizes) faces, corners kept in order."""
-    corners, sizes = faces
     mesh = bpy.data.meshes.new(name)
+    fill(mesh, points, faces)
+    return mesh
+
+
+def fill(mesh: bpy.types.Mesh, points: Points, faces: tuple[NDArray[np.int32], NDArray[np.int32]]) -> None:
+    """Fill an empty mesh as `new_mesh` does."""
+    corners, sizes = faces
     mesh.vertices.add(len(points))
     mesh.loops.add(len(corners))
     mesh.polygons.add(len(sizes))
@@ -104,7 +110,6 @@ def new_mesh(name: str, points: Points, faces: tuple[NDArray[np.int32], NDArray[
     mesh.loops.foreach_set("vertex_index", corners)
     mesh.polygons.foreach_set("loop_start", (np.cumsum(sizes) - sizes).astype(np.int32))
     mesh.update(calc_edges=True)
-    return mesh
 
 
 def apply_matrix(matrix: NDArray[np.float64], points: NDArray[np.floating]) -> Points:

@@ -70,3 +70,10 @@ def read_group(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
     if group is not None:
         weights[:] = [next((g.weight for g in v.groups if g.group == group.index), 0.0) for v in obj.data.vertices]
     return weights
+
+
+def write_whole(obj: bpy.types.Object, names: list[str]) -> None:
+    """Put each vertex into the group of its name (`#V` names), with weight 1. Not in Edit Mode."""
+    for name in dict.fromkeys(names):
+        rows = [row for row, other in enumerate(names) if other == name]
+        (obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)).add(rows, 1.0, "REPLACE")

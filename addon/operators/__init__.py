@@ -17,6 +17,7 @@ from .discard_edit import CAGE_RIG_OT_discard_edit
 from .drop_coordinates import CAGE_RIG_OT_drop_coordinates
 from .export_coordinates import CAGE_RIG_OT_export_coordinates
 from .fix_problem import CAGE_RIG_OT_fix_problem
+from .generate_cage import CAGE_RIG_OT_generate_cage
 from .import_rig import CAGE_RIG_FH_prototype, CAGE_RIG_OT_import_rig
 from .jump_to_key import CAGE_RIG_OT_jump_to_key
 from .key_cage import CAGE_RIG_OT_key_cage
@@ -27,6 +28,7 @@ from .select_part import CAGE_RIG_OT_select_part
 from .unbind import CAGE_RIG_OT_unbind
 
 CLASSES = (
+    CAGE_RIG_OT_generate_cage,
     CAGE_RIG_OT_bind,
     CAGE_RIG_OT_rebind,
     CAGE_RIG_OT_unbind,
@@ -57,7 +59,13 @@ def _add_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
 
 def _object_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
+    self.layout.operator(CAGE_RIG_OT_generate_cage.bl_idname)
     self.layout.operator(CAGE_RIG_OT_bind.bl_idname)
+
+
+def _add_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator(CAGE_RIG_OT_generate_cage.bl_idname, text="Cage of Selected Character", icon="MESH_CUBE")
 
 
 def _import_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -71,6 +79,7 @@ def _export_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
 MENUS = (
     (bpy.types.VIEW3D_MT_add, _add_menu),
     (bpy.types.VIEW3D_MT_object, _object_menu),
+    (bpy.types.VIEW3D_MT_mesh_add, _add_menu),
     (bpy.types.TOPBAR_MT_file_import, _import_menu),
     (bpy.types.TOPBAR_MT_file_export, _export_menu),
 )

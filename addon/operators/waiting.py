@@ -7,6 +7,7 @@ Operators that take long are modal, driven by a timer. Nothing but views can be 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import bpy
 
@@ -17,7 +18,15 @@ LOOKING = {"MOUSEMOVE", "MIDDLEMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTA
 LOOKING |= {"WHEELUPMOUSE", "WHEELDOWNMOUSE", "WHEELINMOUSE", "WHEELOUTMOUSE"}
 LOOKING |= {"TIMER", "WINDOW_DEACTIVATE", *(f"NUMPAD_{digit}" for digit in range(10)), "NUMPAD_PERIOD"}
 
-_open: list[Wait] = []
+
+class Open(Protocol):
+    """What a window shows, until it is given up."""
+
+    def give_up(self) -> None:
+        """Leave nothing behind."""
+
+
+_open: list[Open] = []  # ended when the add-on goes
 
 
 class Wait:
@@ -47,7 +56,7 @@ class Wait:
                 header.layout.label(text="Cancel")
 
         bpy.context.window_manager.progress_update(100.0 * share)
-        self._show(draw)
+        show_status(self._window, draw)
 
     def end(self) -> None:
         """Give the window back."""
@@ -57,12 +66,7 @@ class Wait:
         manager = bpy.context.window_manager
         manager.event_timer_remove(self._timer)
         manager.progress_end()
-        self._show(None)
-
-    def _show(self, draw: Callable[[bpy.types.Header, bpy.types.Context], None] | None) -> None:
-        if any(window == self._window for window in bpy.context.window_manager.windows):
-            with bpy.context.temp_override(window=self._window):
-                self._window.workspace.status_text_set(draw)
+        show_status(self._window, None)
 
     def give_up(self) -> None:
         """Take the work back and give the window back."""
@@ -70,10 +74,28 @@ class Wait:
         self._give_up()
 
 
+def show_status(window: bpy.types.Window, draw: Callable[[bpy.types.Header, bpy.types.Context], None] | None) -> None:
+    """Let the status bar of a window show something, or Blender's own again. The window may be closed already."""
+    if any(other == window for other in bpy.context.window_manager.windows):
+        with bpy.context.temp_override(window=window):
+            window.workspace.status_text_set(draw)
+
+
+def begin(work: Open) -> None:
+    """It is given up when the add-on goes, unless it ends before."""
+    _open.append(work)
+
+
+def end(work: Open) -> None:
+    """It has ended."""
+    if work in _open:
+        _open.remove(work)
+
+
 def end_all() -> None:
     """The add-on goes: Blender forgets modal operators without a word to them."""
-    for wait in list(_open):
-        wait.give_up()
+    for work in list(_open):
+        work.give_up()
 
 
 def wants_out(event: bpy.types.Event) -> bool:

@@ -8,6 +8,7 @@ import textwrap
 import bpy
 
 from .. import choosing, keying, repair
+from ..caging import current
 from ..props import METHODS, rig_of
 
 ICONS = {"LIVE": "CHECKMARK", "PAUSED": "PAUSE"}
@@ -38,7 +39,13 @@ class _Main:
 
     def draw(self, context: bpy.types.Context) -> None:
         cage = rig_of(context.object)
+        if current.shown() is not None:
+            _draw_caging(self.layout, current.shown())
+            return
         if cage is None:
+            self.layout.label(text="Select skins and armature:")
+            self.layout.operator("cage_rig.generate_cage", icon="MOD_LATTICE", text=_caging_label(context.object))
+            self.layout.separator()
             self.layout.label(text="Select skins, armature and cage:")
             row = self.layout.row()
             row.scale_y = 1.4
@@ -134,6 +141,20 @@ class _Rig:
         row.operator("cage_rig.export_coordinates", text="Export")
         if loaded:
             row.operator("cage_rig.drop_coordinates", text="", icon="X")
+
+
+def _caging_label(obj: bpy.types.Object | None) -> str:
+    made = obj is not None and len(obj.cage_rig_generated.skins) > 0
+    return "Edit Generated Cage" if made else "Generate Cage"
+
+
+def _draw_caging(layout: bpy.types.UILayout, shown: current.Shown) -> None:
+    """While bending nodes are edited, and while the cage is computed."""
+    layout.label(text=shown.working or "Click on bones to add nodes", icon="INFO")
+    row = layout.row()
+    row.scale_y = 1.4
+    row.enabled = not shown.working
+    row.operator("cage_rig.generate_cage", icon="CHECKMARK", text="Generate")
 
 
 def _draw_state(layout: bpy.types.UILayout, cage: bpy.types.Object, width: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 ROOT = Path(__file__).parent.parent.parent
 sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests/window"), str(ROOT)]
@@ -289,7 +291,70 @@ def bake() -> Acts:
     yield LOOK
 
 
-ACTS = {act.__name__: act for act in (bind, panels, drag, refit, weights, parts, driven, bake, keys)}
+def generate() -> Acts:
+    """Cross sections while nodes are edited; the cage; an elbow bent and the belly fattened with it."""
+    rig = stage.start(bind=False, frame=1)
+    bpy.data.objects.remove(rig.cage)
+    rig.armature.data.pose_position = "REST"
+    stage.only(*rig.skins, rig.armature)
+    stage.open_panels()
+    yield from settle()
+    area, region = driver.view()
+    with bpy.context.temp_override(window=driver.window(), area=area, region=region):
+        bpy.ops.cage_rig.generate_cage("INVOKE_DEFAULT")
+    yield from settle()
+    stage.zoom(0.92)
+    box = stage.joined(stage.around(rig.skins, 60), top_of_sidebar(200))
+    bone = rig.armature.data.bones["thigh.L"]
+    driver.move(driver.on_screen(bone.head_local.lerp(bone.tail_local, 0.55)))
+    yield from settle()
+    stage.picture("generate_nodes", box)
+    driver.click(driver.on_screen(bone.head_local.lerp(bone.tail_local, 0.55)))
+    yield LOOK
+    driver.key("RET")
+    for _ in range(600):
+        yield 0.2
+        if bpy.context.object is not None and bpy.context.object.cage_rig_generated.armature is not None:
+            break
+    yield from settle()
+    cage = bpy.context.object
+    rig.armature.hide_set(True)
+    stage.only(cage)
+    yield from settle()
+    stage.picture("generated", stage.around([cage], 30))
+    yield from generated_at_work(rig.skins, rig.armature, cage)
+
+
+def generated_at_work(skins: list[bpy.types.Object], armature: bpy.types.Object, cage: bpy.types.Object) -> Acts:
+    armature.hide_set(False)
+    stage.only(*skins, armature, cage, active=cage)
+    bpy.ops.cage_rig.bind()
+    armature.data.pose_position = "POSE"
+    armature.animation_data_clear()
+    for bone in armature.pose.bones:
+        bone.matrix_basis.identity()
+    made = cage.cage_rig
+    stage.hide(cage, armature, made.refit_armature)
+    stage.only(made.posed_cage)
+    yield from settle()
+    box = stage.around([made.posed_cage], 40)
+    for side, sign in (("L", -1.0), ("R", 1.0)):
+        bone = armature.pose.bones[f"forearm.{side}"]
+        turn = Matrix.Rotation(sign * math.radians(90.0), 4, (0.0, 1.0, 0.0))
+        head = Matrix.Translation(bone.head)
+        bone.matrix = head @ turn @ head.inverted() @ bone.matrix
+    yield from settle()
+    stage.picture("generate_bend_before", box)
+    points = stage.points(cage)
+    groups = {group.index for group in cage.vertex_groups if group.name.startswith(("spine", "chest", "hips"))}
+    belly = np.array([any(g.group in groups for g in vertex.groups) for vertex in cage.data.vertices])
+    points[belly, :2] *= (1.35, 1.5)
+    add_shape_key(cage, "Fat", points).value = 1.0
+    yield from settle()
+    stage.picture("generate_bend", box, side_by_side=["generate_bend_before"])
+
+
+ACTS = {act.__name__: act for act in (generate, bind, panels, drag, refit, weights, parts, driven, bake, keys)}
 
 
 def settle() -> Acts:

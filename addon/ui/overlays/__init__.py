@@ -11,10 +11,12 @@ from typing import Any
 
 import bpy
 
+from ...caging import current
 from . import cursor, events, legend, shaders, subject
 from .cages import Cages
 from .figures import Anchors, Joints, JointWeights
 from .heat import HeatMap
+from .sections import Sections, draw_words
 from .surfaces import Surfaces
 
 NAMES = ("weights", "fade", "anchors", "joints", "joint_weights")  # in the order of their drawing
@@ -31,6 +33,7 @@ class Overlays:
         self.anchors = Anchors(surfaces, ink)
         self.joints = Joints(ink)
         self.joint_weights = JointWeights(ink)
+        self.sections = Sections(ink)
 
     def draw(self, name: str, context: bpy.types.Context, settings: Any, found: subject.Subject) -> None:
         """Draw one overlay in the scene."""
@@ -86,6 +89,7 @@ _running = _Running()
 def draw_view() -> None:
     """In the scene, after Blender's own drawing of it."""
     _guarded(NAMES, _draw_view)
+    _draw_editing(lambda shown: _running.kept().sections.draw(shown))
 
 
 def _draw_view() -> None:
@@ -100,6 +104,7 @@ def _draw_view() -> None:
 def draw_pixels() -> None:
     """Over the picture: the legend."""
     _guarded(("weights", "joint_weights", "fade"), _draw_pixels)
+    _draw_editing(lambda shown: draw_words(bpy.context, shown))
 
 
 def _draw_pixels() -> None:
@@ -138,7 +143,7 @@ def _look_after() -> None:
         cursor.follow(draw_cursor)
     else:
         cursor.leave()
-    if not any(getattr(settings, name) for settings in wanted for name in NAMES):
+    if not any(getattr(settings, name) for settings in wanted for name in NAMES) and current.shown() is None:
         _running.overlays = None
 
 
@@ -154,6 +159,18 @@ def _guarded(names: tuple[str, ...], draw: Callable[[], None]) -> None:
         _running.failures.update(dict.fromkeys(names, text))
         if not bpy.app.timers.is_registered(_switch_off):
             bpy.app.timers.register(_switch_off, first_interval=0.0)
+
+
+def _draw_editing(draw: Callable[[current.Shown], None]) -> None:
+    """What is shown of bending nodes, while they are edited; the editing ends where that fails."""
+    shown = current.shown()
+    if shown is None or bpy.app.background:
+        return
+    try:
+        with shaders.tidy():
+            draw(shown)
+    except Exception as error:
+        shown.failure = f"The nodes could not be shown ({type(error).__name__}: {error}); please report it"
 
 
 def _switch_off() -> None:

@@ -15,6 +15,7 @@ from . import colours
 
 WIDTH, BAR, PAD, GAP, TEXT, MARGIN = 170.0, 9.0, 9.0, 6.0, 11.0, 12.0  # in units of the interface
 BACK = (0.09, 0.09, 0.09, 0.78)
+ALARM = (1.0, 0.62, 0.55)
 FONT = 0
 
 
@@ -71,6 +72,25 @@ def draw(context: bpy.types.Context, entries: list[Entry | str]) -> None:
     for entry in entries:
         draw_one = _draw_text if isinstance(entry, str) else _draw_bar
         bottom += draw_one(entry, right, bottom, unit) + GAP * unit
+
+
+def words(context: bpy.types.Context, lines: list[str], *, alarm: bool) -> None:
+    """Lines of text in the lower left corner, the first one in bold colour where something is wrong."""
+    unit = context.preferences.system.ui_scale
+    left = max((other.x - context.region.x + other.width for other in _on_the_left(context)), default=0)
+    blf.size(FONT, TEXT * unit)
+    width = max(_length(line) for line in lines) + 2 * PAD * unit
+    step = (TEXT + GAP) * unit
+    x, y = left + MARGIN * unit, MARGIN * unit
+    _rectangle(x, y, width, len(lines) * step + 2 * PAD * unit - GAP * unit, BACK)
+    for row, line in enumerate(reversed(lines)):
+        blf.color(FONT, *(ALARM if alarm and row < len(lines) - 1 else (0.93, 0.93, 0.93)), 1.0)
+        _text(line, x + PAD * unit, y + PAD * unit + row * step)
+
+
+def _on_the_left(context: bpy.types.Context) -> list[bpy.types.Region]:
+    """Regions that lie over the view's left side."""
+    return [other for other in context.area.regions if other.type == "TOOLS" and other.width > 1]
 
 
 def _draw_text(text: str, right: float, bottom: float, unit: float) -> float:

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cages generated from a character and its bones.
+
+    from bl_ext.user_default.cage_rig import caging
+    objects = bpy.data.objects
+    cage = caging.generate_cage(bpy.context, [objects["Body"]], objects["Armature"])
+
+The object that comes back is a closed mesh around the skins at rest, ready for `lifecycle.bind`. It keeps how it was
+made in `cage.cage_rig_generated`, and for each vertex the cross section (attribute `cage_rig_section`) and the bone
+(vertex groups) that it belongs to. Where no cage can be made, `GenerateError` says why, and nothing has changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from ..generator import Cancelled, Job, Refusal
+from . import character, refusals, result
+from .character import Character
+from .course import OnBone
+from .editing import Editing, Source
+from .options import Options
+from .refusals import GenerateError
+from .result import nodes_of, options_of, refuse_cage
+
+__all__ = [
+    "Cancelled",
+    "Character",
+    "Editing",
+    "GenerateError",
+    "Job",
+    "OnBone",
+    "Options",
+    "Source",
+    "edit",
+    "finish",
+    "generate_cage",
+    "make",
+    "nodes_of",
+    "open_character",
+    "options_of",
+    "refuse_cage",
+    "source",
+]
+
+
+def generate_cage(
+    context: bpy.types.Context,
+    skins: list[bpy.types.Object],
+    armature: bpy.types.Object | None,
+    options: Options | None = None,
+    *,
+    nodes: list[OnBone] | None = None,
+    cage: bpy.types.Object | None = None,
+    tell: Callable[[str], object] | None = None,
+) -> bpy.types.Object:
+    """Generate a cage around skins, from the bones of their armature that move them. Object Mode.
+
+    Without an armature (None) the core looks for a skeleton in the skin.
+
+    `nodes`: bending nodes as (bone, position), 0 at the bone's head and 1 at its tail; else they are placed. `cage`: an
+    object that gets the new mesh in place of its own, with the nodes that it remembers unless others are given. `tell`
+    gets a sentence on what was made.
+    """
+    if cage is not None:
+        options = options or options_of(cage)
+        nodes = nodes_of(cage) if nodes is None else nodes
+    return make(context, skins, armature, options or Options(), nodes, cage=cage, tell=tell)
+
+
+def make(
+    context: bpy.types.Context,
+    skins: list[bpy.types.Object],
+    armature: bpy.types.Object | None,
+    options: Options,
+    nodes: list[OnBone] | None,
+    *,
+    cage: bpy.types.Object | None,
+    tell: Callable[[str], object] | None,
+) -> bpy.types.Object:
+    """As `generate_cage`, but nothing is taken from the cage."""
+    if cage is not None:
+        refuse_cage(cage)
+    found = open_character(context, armature, skins, options)
+    editing = edit(found, options, nodes)
+    try:
+        job = found.generator.start(editing.bending)
+        while not job.wait(0.5):
+            pass
+        return finish(context, job, found, options, editing.nodes, cage=cage, tell=tell)
+    except Refusal as refusal:
+        raise explain(refusal, found) from refusal
+
+
+def open_character(
+    context: bpy.types.Context, armature: bpy.types.Object | None, skins: list[bpy.types.Object], options: Options
+) -> Character:
+    """Read a character. Raises `GenerateError`."""
+    return character.read(context, armature, skins, options)
+
+
+def edit(found: Character, options: Options, nodes: list[OnBone] | None) -> Editing:
+    """The character's bending nodes, to be edited. Raises `GenerateError`."""
+    try:
+        return Editing(source(found, options), symmetry=options.symmetry, nodes=nodes)
+    except Refusal as refusal:
+        raise explain(refusal, found) from refusal
+
+
+def source(found: Character, options: Options) -> Source:
+    """What places the nodes of a character."""
+    return Source(found.generator, found.course, options.placement)
+
+
+def finish(
+    context: bpy.types.Context,
+    job: Job,
+    found: Character,
+    options: Options,
+    nodes: list[OnBone] | None,
+    *,
+    cage: bpy.types.Object | None = None,
+    tell: Callable[[str], object] | None = None,
+) -> bpy.types.Object:
+    """The object of a cage that is done. Raises `Refusal` or `Cancelled`."""
+    made = job.result()
+    obj = result.write(context, cage, made, found, options, nodes)
+    if tell is not None:
+        tell(result.summary(obj, made, [*found.notes, *character.left_out(found)]))
+    return obj
+
+
+def explain(refusal: Refusal, found: Character) -> GenerateError:
+    """A refusal of the core in the artist's terms."""
+    return refusals.explained(refusal, found.scene)

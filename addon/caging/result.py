@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The generated cage as an object, ready to be bound, which remembers how it was made."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import bpy
+import numpy as np
+
+from ..adapters import positions, vertex_groups
+from ..generator import Cage
+from .character import Character
+from .course import OnBone
+from .options import Options
+from .refusals import GenerateError
+
+SECTION = "cage_rig_section"
+
+
+def refuse_cage(cage: bpy.types.Object) -> None:
+    """Raise `GenerateError` where this object can't get a new cage in place of its own."""
+    if cage.cage_rig.state != "NONE":
+        raise GenerateError(f"'{cage.name}' is bound; Unbind it, generate it anew, and bind it again")
+    if cage.library is not None or cage.data.library is not None or cage.override_library is not None:
+        raise GenerateError(f"'{cage.name}' is linked from another file; generate it in its own file")
+    if cage.data.shape_keys is not None:
+        raise GenerateError(f"'{cage.name}' has shape keys, which a new cage has no vertices for; remove them first")
+
+
+def write(
+    context: bpy.types.Context,
+    cage: bpy.types.Object | None,
+    made: Cage,
+    character: Character,
+    options: Options,
+    nodes: list[OnBone] | None,
+) -> bpy.types.Object:
+    """Make the object, or give `cage` a new mesh in place of its own. Object Mode. Selects what Bind needs."""
+    corners, sizes = (part.astype(np.int32) for part in made.faces)
+    points = made.points.astype(np.float32)
+    if cage is None:
+        mesh = positions.new_mesh(f"{_name(character)} Cage", points, (corners, sizes))
+        cage = bpy.data.objects.new(mesh.name, mesh)
+        cage.display_type, cage.hide_render = "WIRE", True
+        homes = character.skins[0].users_collection or (context.scene.collection,)
+        homes[0].objects.link(cage)
+    else:
+        cage.data.clear_geometry()
+        cage.vertex_groups.clear()
+        positions.fill(cage.data, points, (corners, sizes))
+    cage.matrix_world = character.space.matrix_world
+    owners = cage.data.attributes.new(SECTION, "INT", "POINT")
+    owners.data.foreach_set("value", made.owners.astype(np.int32))
+    bones = _bones(made, character)
+    if character.armature is not None:
+        vertex_groups.write_whole(cage, [bones[owner] for owner in made.owners.tolist()])
+    _remember(cage, character, options, nodes)
+    _select(context, cage, character)
+    return cage
+
+
+def _name(character: Character) -> str:
+    return character.skins[0].name if len(character.skins) == 1 else character.space.name
+
+
+def _bones(made: Cage, character: Character) -> list[str]:
+    """The bone of each section."""
+    course = character.course
+    places = [course.nearest(section.point) for section in made.sections]
+    return [course.named(place).bone for place in places]
+
+
+def _remember(cage: bpy.types.Object, character: Character, options: Options, nodes: list[OnBone] | None) -> None:
+    kept = cage.cage_rig_generated
+    kept.armature = character.armature
+    kept.skins.clear()
+    for skin in character.skins:
+        kept.skins.add().object = skin
+    for name, value in vars(options).items():
+        setattr(kept, name, value)
+    kept.own_nodes = nodes is not None
+    kept.nodes.clear()
+    for node in nodes or ():
+        item = kept.nodes.add()
+        item.name, item.position = node
+
+
+def _select(context: bpy.types.Context, cage: bpy.types.Object, character: Character) -> None:
+    chosen = (*character.skins, character.armature, cage)
+    for obj in context.view_layer.objects:
+        obj.select_set(obj in chosen)
+    if cage.name in context.view_layer.objects:
+        context.view_layer.objects.active = cage
+
+
+def options_of(cage: bpy.types.Object) -> Options:
+    """How this cage was generated."""
+    kept = cage.cage_rig_generated
+    return Options(**{name: getattr(kept, name) for name in vars(Options())})
+
+
+def nodes_of(cage: bpy.types.Object) -> list[OnBone] | None:
+    """The artist's bending nodes of this cage; None where they were placed."""
+    kept = cage.cage_rig_generated
+    return [OnBone(node.name, node.position) for node in kept.nodes] if kept.own_nodes else None
+
+
+def summary(cage: bpy.types.Object, made: Cage, notes: list[str]) -> str:
+    """One sentence on the cage, and what the artist should know."""
+    sizes = Counter(made.faces[1].tolist())
+    quads, triangles = sum(sizes.values()) - sizes[3], sizes[3]
+    text = (
+        f"'{cage.name}': {len(made.points)} vertices in {len(made.sections)} cross sections, {quads} quads and "
+        f"{triangles} triangles, {made.report['volume_ratio']:.2f} times the volume of what it encloses"
+    )
+    return ". ".join([text, *notes])
