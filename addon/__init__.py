@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from . import handlers, headless, operators, props, ui
+from . import handlers, headless, operators, props, translations, ui
 
-MODULES = (props, operators, ui, handlers, headless)
+MODULES = (translations, props, operators, ui, handlers, headless)
 
 
 def register() -> None:

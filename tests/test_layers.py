@@ -86,7 +86,8 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"argparse", "bpy", "json", "mathutils", "numpy", "pathlib", "sys", "time", "zipfile"},
         {"adapters", "bake", "binding", "headless", "registry", "session", "sync"},
     ),
-    "__init__": (set(), {"handlers", "headless", "operators", "props", "ui"}),
+    "__init__": (set(), {"handlers", "headless", "operators", "props", "translations", "ui"}),
+    "translations": ({"bpy"}, set()),
     "__main__": ({"addon_utils", "bpy", "importlib", "pathlib", "sys"}, set()),
 }
 STANDARD = {"__future__", "atexit", "collections", "contextlib", "dataclasses", "enum", "functools", "itertools"}

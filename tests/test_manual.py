@@ -14,6 +14,7 @@ DOCS = ROOT / "docs"
 PAGE = DOCS / "problems.md"
 NOT_SHOWN = {"description", "name", "bl_label", "help", "HELP"}  # shown where they belong: tooltips, labels, --help
 MENUS = {"_import_menu", "_export_menu"}
+MESSAGES = sorted(path for path in (ROOT / "addon").rglob("*.py") if path.name != "translations.py")
 
 
 def sentences(path: Path) -> Iterator[str]:
@@ -67,14 +68,14 @@ def page() -> str:
     return _plain(PAGE.read_text().replace("\\", ""))
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "addon").rglob("*.py")), ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize("path", MESSAGES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_the_manual_names_every_message_of_the_add_on(path: Path, page: str) -> None:
     missing = [text for text in sentences(path) if text not in page]
     assert not missing, f"put these into {PAGE.relative_to(ROOT)} with what to do"
 
 
 def test_messages_are_found() -> None:
-    found = {text for path in (ROOT / "addon").rglob("*.py") for text in sentences(path)}
+    found = {text for path in MESSAGES for text in sentences(path)}
     assert len(found) > 120
     assert "Only in Object Mode" in found
     assert "'…' has no faces, so it can't be a skin" in found
