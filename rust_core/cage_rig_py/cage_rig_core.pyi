@@ -78,6 +78,8 @@ class Options(TypedDict, total=False):
     falloff: float  # outside the cage its effect ends after so many mean cage edges
     center_sigma: float
     center_bins: int  # 0: exact, slow
+    half_weights: bool  # 16-bit coordinates in frames: faster above some 100,000 vertices, within 2e-4 of the movement
+    instructions: str  # those of frames: baseline, avx2, avx512 or neon; the fastest there are
 
 class Report(TypedDict):
     cage_turned: bool
@@ -98,10 +100,12 @@ class Work(TypedDict):
     reverse_factorisations: int
     reverse_solves: int
     rest_passes: int
+    rest_column_passes: int  # those of them that read few columns alone, as in a drag
     skin_passes: int
     cage_fits: int
     center_integrations: int
     center_passes: int
+    center_column_passes: int
 
 @final
 class CoupledRig:
@@ -147,6 +151,12 @@ class CoupledRig:
     def start_method(self, name: str) -> MethodJob: ...
     @property
     def method(self) -> str: ...
+    def posed_skins(
+        self,
+        cages: ArrayLike,  # (#F, #C, 3), or (#C, 3) for a still cage
+        transforms: ArrayLike,  # (#F, #J, 4, 4)
+        rest_joints: ArrayLike | None = None,
+    ) -> NDArray[np.float32]: ...  # (#F, #M, 3); the rig stays as it is
     def posed_skin_into(self, out: NDArray[Any], start: int = 0) -> None: ...
     def rest_skin_into(self, out: NDArray[Any], start: int = 0) -> None: ...
     def posed_cage_into(self, out: NDArray[Any]) -> None: ...

@@ -5,8 +5,9 @@
 //!   integral, here of some vertices, takes minutes and says how far off the bins are.
 #![allow(clippy::print_stdout, missing_docs)]
 
+use cage_rig::simd::Path;
 use cage_rig::skinning::centers::{centers, CenterOptions};
-use cage_rig::skinning::{PackedWeights, SkinningInput, METHODS};
+use cage_rig::skinning::{FrameWeights, PackedWeights, Scratch, SkinningInput, METHODS};
 use cage_rig::{unwatched, Matrix3, Point, Rows, SkinWeights, Transform};
 use std::time::Instant;
 
@@ -62,13 +63,13 @@ fn best_of(times: usize, mut work: impl FnMut()) -> f64 {
 
 fn frame() {
     let snake = snake(400, 100, 60);
-    let weights = PackedWeights::new(&snake.weights);
-    let mut posed = snake.skin.clone();
+    let weights = FrameWeights::new(&snake.weights);
+    let (mut posed, mut scratch, path) = (snake.skin.clone(), Scratch::default(), Path::default());
     for (what, transforms) in [("rigid", pose(60, false)), ("scaled", pose(60, true))] {
         for method in METHODS {
             let (transforms, rest_skin) = (&transforms[..], &snake.skin[..]);
-            let input = SkinningInput { transforms, weights: &weights, rest_skin, centers: rest_skin };
-            let seconds = best_of(50, || (method.pose)(&input, &mut posed));
+            let input = SkinningInput { path, transforms, weights: &weights, rest_skin, centers: rest_skin };
+            let seconds = best_of(50, || (method.pose)(&input, &mut scratch, &mut posed));
             assert!(posed.iter().flatten().all(|x| x.is_finite()));
             println!("frame {what:6} {}: {:5.1} ns/vertex", method.name, seconds * 1e9 / 40_000.0);
         }

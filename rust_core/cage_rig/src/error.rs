@@ -189,6 +189,8 @@ pub enum PoseError {
     TransformNotFinite { joint: usize },
     #[error("the transform of joint {joint} is not affine: its last row must be 0 0 0 1")]
     NotAffine { joint: usize },
+    #[error("there are {found} rows for the frames to fill; they have {expected}")]
+    FrameRows { expected: usize, found: usize },
     #[error("there are {found} rest joints; the skeleton has {expected} joints")]
     JointCount { expected: usize, found: usize },
     #[error("rest joint {joint} has a coordinate that is not finite or beyond 1e12")]

@@ -5,6 +5,8 @@ use crate::progress::{unwatched, Cancelled, Part};
 use crate::rows::Rows;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::{PartialPivLu, Solve};
+use faer::linalg::triangular_solve::{solve_unit_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::reborrow::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
@@ -71,11 +73,17 @@ impl Lu {
         }
     }
 
-    /// Solves for three right sides at once, one per coordinate.
-    pub(crate) fn solve_points(&self, right: &[Point]) -> Vec<Point> {
-        let right = Mat::from_fn(right.len(), 3, |i, d| right[i][d]);
-        let x = self.factors.solve(&right);
-        (0..x.nrows()).map(|i| Point::new(x[(i, 0)], x[(i, 1)], x[(i, 2)])).collect()
+    /// Solves for three right sides at once, one per coordinate, and writes the solution into `out`;
+    /// `numbers` is what it works with.
+    pub(crate) fn solve_points_into(&self, right: &[Point], numbers: &mut Vec<f64>, out: &mut Vec<Point>) {
+        let (count, (order, _)) = (right.len(), self.factors.P().arrays());
+        numbers.clear();
+        (0..3).for_each(|d| numbers.extend(order.iter().map(|&i| right[i][d])));
+        let mut x = MatMut::from_column_major_slice_mut(numbers, count, 3);
+        solve_unit_lower_triangular_in_place(self.factors.L(), x.rb_mut(), Par::Seq);
+        solve_upper_triangular_in_place(self.factors.U(), x.rb_mut(), Par::Seq);
+        out.clear();
+        out.extend((0..count).map(|i| Point::new(x[(i, 0)], x[(i, 1)], x[(i, 2)])));
     }
 
     /// Solves for one right side of 3n numbers, x y z of each point in turn.

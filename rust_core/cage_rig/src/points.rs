@@ -53,5 +53,10 @@ pub fn bounding_diagonal(points: &[Point]) -> f64 {
 
 /// `points` in the single precision of the frame arrays.
 pub(crate) fn to_f32(points: &[Point]) -> Vec<[f32; 3]> {
-    points.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect()
+    points.iter().map(to_single).collect()
+}
+
+/// `point` in the single precision of the frame arrays.
+pub(crate) fn to_single(point: &Point) -> [f32; 3] {
+    [point.x as f32, point.y as f32, point.z as f32]
 }

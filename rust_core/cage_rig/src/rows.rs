@@ -77,6 +77,12 @@ impl Rows {
         (0..self.len()).into_par_iter().with_min_len(256).map(|i| self.combine(i, points)).collect()
     }
 
+    /// The same, written into `out`; in one thread.
+    pub(crate) fn times_into(&self, points: &[Point], out: &mut Vec<Point>) {
+        out.clear();
+        out.extend((0..self.len()).map(|i| self.combine(i, points)));
+    }
+
     /// The first row with a number that is not usable.
     pub(crate) fn first_unusable(&self) -> Option<usize> {
         (0..self.len()).find(|&i| !self.row(i).iter().all(is_usable))

@@ -149,16 +149,36 @@ fn rows_of(block: Block<f64>, argument: &str) -> PyResult<Rows> {
 /// Transforms, `#J by 4 by 4`, acting on columns.
 pub(crate) fn transforms(value: &Bound<'_, PyAny>, joints: usize) -> PyResult<Vec<Transform>> {
     let shape = [("#J", Some(joints)), ("4", Some(4)), ("4", Some(4))];
-    let block = finite_floats(value, "transforms", &shape)?;
-    let read = |(joint, m): (usize, &[f64])| {
+    affine(&finite_floats(value, "transforms", &shape)?, joints)
+}
+
+/// Transforms of frames, `#F by #J by 4 by 4`, frame by frame.
+pub(crate) fn transforms_of_frames(value: &Bound<'_, PyAny>, joints: usize) -> PyResult<Vec<Transform>> {
+    let shape = [("#F", None), ("#J", Some(joints)), ("4", Some(4)), ("4", Some(4))];
+    affine(&finite_floats(value, "transforms", &shape)?, joints)
+}
+
+fn affine(block: &Block<f64>, joints: usize) -> PyResult<Vec<Transform>> {
+    let read = |(at, m): (usize, &[f64])| {
         // Single-precision inverses leave some rounding here.
         if m[12..].iter().zip([0.0, 0.0, 0.0, 1.0]).any(|(found, wanted)| (found - wanted).abs() > 1e-5) {
-            return Err(crate::errors::raise(cage_rig::PoseError::NotAffine { joint }));
+            return Err(crate::errors::raise(cage_rig::PoseError::NotAffine { joint: at % joints }));
         }
         let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
         Ok(Transform { linear, translation: Point::new(m[3], m[7], m[11]) })
     };
     block.data.chunks_exact(16).enumerate().map(read).collect()
+}
+
+/// Cages of frames, `#F by #C by 3`, or one for all of them, `#C by 3`.
+pub(crate) fn cages(value: &Bound<'_, PyAny>, frames: usize, vertices: usize) -> PyResult<Vec<Point>> {
+    let dimensions: usize = value.getattr("ndim").and_then(|ndim| ndim.extract()).unwrap_or(3);
+    if dimensions == 2 {
+        return points(value, "cages", ("#C", Some(vertices)));
+    }
+    let shape = [("#F", Some(frames)), ("#C", Some(vertices)), ("3", Some(3))];
+    let block = finite_floats(value, "cages", &shape)?;
+    Ok(block.data.chunks_exact(3).map(Point::from_column_slice).collect())
 }
 
 /// Faces: triangles `#F by 3`, or a pair (corner indices, face sizes).
@@ -268,6 +288,20 @@ pub(crate) enum OutView<'a> {
 }
 
 impl OutView<'_> {
+    /// Writes `points[start..]` until the array is full, as they are where it is float32 too.
+    pub(crate) fn write_singles(self, points: &[[f32; 3]], start: usize) -> PyResult<()> {
+        if let Self::Single(mut view) = self {
+            let rows = view.len() / 3;
+            let source = start.checked_add(rows).and_then(|end| points.get(start..end));
+            if let (Some(out), Some(source)) = (view.as_slice_mut(), source) {
+                out.copy_from_slice(source.as_flattened());
+                return Ok(());
+            }
+            return Self::Single(view).write(points, start);
+        }
+        self.write(points, start)
+    }
+
     /// Writes `points[start..]` until the array is full.
     pub(crate) fn write<T: Into<f64> + Copy>(self, points: &[[T; 3]], start: usize) -> PyResult<()> {
         match self {

@@ -2,8 +2,9 @@
 
 use crate::arrays;
 use crate::errors::{CageRigError, OrRaise};
+use cage_rig::simd::Path;
 use cage_rig::sync::{BindInput, BindOptions, Known};
-use cage_rig::{Cage, Skeleton};
+use cage_rig::{Cage, Precision, Skeleton};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -73,12 +74,31 @@ fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOptions> {
             "falloff" => options.falloff = value.extract()?,
             "center_sigma" => options.centers.sigma = value.extract()?,
             "center_bins" => options.centers.bins = value.extract()?,
+            "half_weights" => options.precision = precision(value.extract()?),
+            "instructions" => options.path = path(&value.extract::<String>()?)?,
             unknown => {
                 return Err(CageRigError::new_err(format!(
-                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular, falloff, center_sigma, center_bins"
+                    "there is no option named {unknown:?}; known: max_anchor_ratio, max_anchor_swaps, locality_exponent, min_singular, falloff, center_sigma, center_bins, half_weights, instructions"
                 )))
             }
         }
     }
     Ok(options)
+}
+
+fn precision(half: bool) -> Precision {
+    if half {
+        Precision::Half
+    } else {
+        Precision::Single
+    }
+}
+
+fn path(name: &str) -> PyResult<Path> {
+    let available = Path::available();
+    available.iter().find(|path| path.name() == name).copied().ok_or_else(|| {
+        let known: Vec<_> = available.iter().map(|path| path.name()).collect();
+        let known = known.join(", ");
+        CageRigError::new_err(format!("this processor has no instructions named {name:?}; it has {known}"))
+    })
 }

@@ -6,7 +6,7 @@ use crate::errors::{CageRigError, OrRaise};
 use crate::input::{read_input, Given, Meshes};
 use crate::jobs::MethodJob;
 use cage_rig::sync::rest_centers::RestCenters;
-use cage_rig::sync::Carried;
+use cage_rig::sync::{Carried, Frame};
 use cage_rig::Point;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -180,12 +180,35 @@ impl CoupledRig {
         self.with(py, |rig| rig.method().name)
     }
 
+    /// Posed skins (#F, #M, 3) of frames known in advance, as play and posed_skin give them: cages
+    /// (#F, #C, 3), or (#C, 3) for a still one, and transforms (#F, #J, 4, 4). The rig stays as it is.
+    #[pyo3(signature = (cages, transforms, rest_joints=None))]
+    fn posed_skins<'py>(
+        &self,
+        py: Python<'py>,
+        cages: &Bound<'py, PyAny>,
+        transforms: &Bound<'py, PyAny>,
+        rest_joints: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let transforms = arrays::transforms_of_frames(transforms, self.joints)?;
+        let frames = transforms.len() / self.joints;
+        let cages = arrays::cages(cages, frames, self.cage_vertices)?;
+        let rest_joints = self.rest_joints(rest_joints)?;
+        let mut posed = vec![[0.0f32; 3]; frames * self.skin_vertices];
+        // A still cage comes once.
+        let cage_of = |f: usize| &cages[f * self.cage_vertices % cages.len()..][..self.cage_vertices];
+        let transforms = transforms.chunks_exact(self.joints).enumerate();
+        let input: Vec<Frame> = transforms.map(|(f, transforms)| (cage_of(f), transforms)).collect();
+        self.with(py, |rig| rig.posed_skins(&input, rest_joints.as_deref(), &mut posed))?.or_raise()?;
+        PyArray1::from_vec(py, posed.into_flattened()).reshape([frames, self.skin_vertices, 3])
+    }
+
     /// Writes rows of the posed skin, from row start on, into out (n, 3) or flat.
     #[pyo3(signature = (out, start=0))]
     fn posed_skin_into(&self, py: Python<'_>, out: &Bound<'_, PyAny>, start: usize) -> PyResult<()> {
         let mut out = Out::new(out)?;
         let view = out.view();
-        self.with(py, |rig| view.write(rig.posed_skin(), start))?
+        self.with(py, |rig| view.write_singles(rig.posed_skin(), start))?
     }
 
     /// Writes rows of the rest skin, from row start on, into out (n, 3) or flat.
@@ -193,7 +216,7 @@ impl CoupledRig {
     fn rest_skin_into(&self, py: Python<'_>, out: &Bound<'_, PyAny>, start: usize) -> PyResult<()> {
         let mut out = Out::new(out)?;
         let view = out.view();
-        self.with(py, |rig| view.write(rig.rest_skin(), start))?
+        self.with(py, |rig| view.write_singles(rig.rest_skin(), start))?
     }
 
     /// Writes the posed cage into out (#C, 3) or flat.
@@ -330,10 +353,12 @@ impl CoupledRig {
         work.set_item("reverse_factorisations", done.reverse_factorisations)?;
         work.set_item("reverse_solves", done.reverse_solves)?;
         work.set_item("rest_passes", done.rest_passes)?;
+        work.set_item("rest_column_passes", done.rest_column_passes)?;
         work.set_item("skin_passes", done.skin_passes)?;
         work.set_item("cage_fits", done.cage_fits)?;
         work.set_item("center_integrations", done.center_integrations)?;
         work.set_item("center_passes", done.center_passes)?;
+        work.set_item("center_column_passes", done.center_column_passes)?;
         Ok(work)
     }
 

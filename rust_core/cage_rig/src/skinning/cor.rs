@@ -9,68 +9,91 @@
 //! so need no origin, blend linearly, and then R(i) turns: v′ = R(i) Σ_j ω_ij S_j (v − p_i) +
 //! Σ_j ω_ij T_j(p_i). A vertex of one bone goes where the bone takes it, whatever its center.
 //!
-//! Signs of quaternions and what the weights lack to 1: as in `dqs.rs`. Cost: 28 numbers per
-//! influence.
+//! Signs of quaternions and what the weights lack to 1: as in `dqs.rs`. Cost: 32 numbers per
+//! influence, 16 where no bone scales.
 
-use super::dqs::{add_weighted, cross, squared, toward, COMPLETE};
-use super::rotation::{matrix_of, rotation_of};
-use super::{each_vertex, SkinningInput};
-use crate::points::{Matrix3, Transform};
+use super::blocks::{each_vertex, Mover, Row};
+use super::lbs::displacement;
+use super::scratch::{Scratch, Turn};
+use super::vectors::{add, affine, cross, scaled, squared, subtract, Three};
+use super::SkinningInput;
+use crate::points::Transform;
+use crate::simd::Lanes;
 
-/// Quaternion; then by columns, four numbers each: S − I with one number of t, L − I padded.
-type Bone = ([f32; 4], [[f32; 4]; 6]);
+/// Where the quaternion is.
+const TURN: usize = 3;
+/// Where S − I begins.
+const SCALE: usize = 4;
 
 /// M′ of a frame, in single precision.
-pub fn pose(input: &SkinningInput, posed: &mut [[f32; 3]]) {
-    let bones: Vec<Bone> = input.transforms.iter().map(motion).collect();
-    each_vertex(input, posed, |i, influences, v| moved(&bones, influences, v, input.centers[i]));
+pub fn pose(input: &SkinningInput, scratch: &mut Scratch, posed: &mut [[f32; 3]]) {
+    let pairs = input.weights.pairs();
+    if scratch.turn(input.transforms) {
+        let table = scratch.paired(pairs, TURN..TURN + 1, input.transforms, rigid);
+        each_vertex(Rigid, table, input, posed);
+    } else {
+        let table = scratch.paired(pairs, TURN..TURN + 1, input.transforms, stretched);
+        each_vertex(Stretched, table, input, posed);
+    }
 }
 
-fn motion(transform: &Transform) -> Bone {
-    let q = rotation_of(&transform.linear);
-    let stretch = matrix_of(q).transpose() * transform.linear;
-    let scale = (stretch + stretch.transpose()) / 2.0 - Matrix3::identity();
-    let linear = transform.linear - Matrix3::identity();
-    let column = |matrix: &Matrix3, k: usize, last: f64| {
-        [matrix[(0, k)], matrix[(1, k)], matrix[(2, k)], last].map(|x| x as f32)
-    };
-    let parts = std::array::from_fn(|k| match k {
-        0..3 => column(&scale, k, transform.translation[k]),
-        _ => column(&linear, k - 3, 0.0),
-    });
-    (q.map(|x| x as f32), parts)
+/// L − I and t by rows, and the quaternion.
+fn rigid(turn: &Turn, transform: &Transform) -> Row<4> {
+    let [x, y, z, _] = displacement(transform);
+    [x, y, z, turn.quaternion.map(|x| x as f32)]
 }
 
-/// v′ of one vertex with center p, as a displacement: exact at rest.
-#[inline]
-fn moved(bones: &[Bone], influences: &[(u32, f32)], v: [f32; 3], p: [f32; 3]) -> [f32; 3] {
-    let Some(&(pivot, _)) = influences.first() else { return v };
-    let pivot = &bones[pivot as usize].0;
-    let mut q = [[0.0f32; 4]];
-    let mut blend = [[0.0f32; 4]; 6];
-    let mut lack = 1.0f32;
-    for &(joint, weight) in influences {
-        let (turn, parts) = &bones[joint as usize];
-        lack -= weight;
-        add_weighted(&mut q, toward(pivot, turn, weight), &[*turn]);
-        add_weighted(&mut blend, weight, parts);
+/// The same and the rows of S − I.
+fn stretched(turn: &Turn, transform: &Transform) -> Row<8> {
+    let stretch = turn.matrix().transpose() * turn.rest;
+    let symmetric = (stretch + stretch.transpose()) / 2.0;
+    let mut row = [[0.0; 4]; 8];
+    row[..SCALE].copy_from_slice(&rigid(turn, transform));
+    for d in 0..3 {
+        (0..3).for_each(|k| row[SCALE + d][k] = symmetric[(d, k)] as f32);
     }
-    let [mut q] = q;
-    if lack > COMPLETE {
-        q[3] += lack.copysign(pivot[3]);
+    row
+}
+
+#[derive(Clone, Copy)]
+struct Rigid;
+
+impl Mover<4> for Rigid {
+    const PAIRS: bool = true;
+    const CENTERS: bool = true;
+
+    #[inline(always)]
+    fn moved<L: Lanes>(lanes: L, rows: &[Row<4>], v: Three<L>, p: Three<L>) -> Three<L> {
+        let matrix = [lanes.columns(rows, 0), lanes.columns(rows, 1), lanes.columns(rows, 2)];
+        let carried = affine(lanes, matrix, p);
+        moved(lanes, lanes.columns(rows, TURN), carried, subtract(lanes, v, p), v)
     }
-    let d: [f32; 3] = std::array::from_fn(|k| v[k] - p[k]);
-    let along = |columns: &[[f32; 4]], x: [f32; 3], k: usize| {
-        columns[0][k] * x[0] + columns[1][k] * x[1] + columns[2][k] * x[2]
-    };
-    let stretch: [f32; 3] = std::array::from_fn(|k| along(&blend[..3], d, k));
-    let e: [f32; 3] = std::array::from_fn(|k| d[k] + stretch[k]);
-    let (u, w) = ([q[0], q[1], q[2]], q[3]);
-    let turned = cross(u, e);
-    let inner = cross(u, std::array::from_fn(|k| turned[k] + w * e[k]));
-    let scale = 2.0 / squared(q);
-    std::array::from_fn(|k| {
-        let carried = along(&blend[3..], p, k) + blend[k][3];
-        v[k] + (carried + stretch[k] + scale * inner[k])
-    })
+}
+
+#[derive(Clone, Copy)]
+struct Stretched;
+
+impl Mover<8> for Stretched {
+    const PAIRS: bool = true;
+    const CENTERS: bool = true;
+
+    #[inline(always)]
+    fn moved<L: Lanes>(lanes: L, rows: &[Row<8>], v: Three<L>, p: Three<L>) -> Three<L> {
+        let arm = subtract(lanes, v, p);
+        let scale =
+            [lanes.columns(rows, SCALE), lanes.columns(rows, SCALE + 1), lanes.columns(rows, SCALE + 2)];
+        let stretch = affine(lanes, scale, arm);
+        let matrix = [lanes.columns(rows, 0), lanes.columns(rows, 1), lanes.columns(rows, 2)];
+        let carried = add(lanes, affine(lanes, matrix, p), stretch);
+        moved(lanes, lanes.columns(rows, TURN), carried, add(lanes, arm, stretch), v)
+    }
+}
+
+/// v′ as a displacement, exact at rest: `arm` (from the center) turns by q, `carried` is the rest.
+#[inline(always)]
+fn moved<L: Lanes>(lanes: L, q: [L::f32s; 4], carried: Three<L>, arm: Three<L>, v: Three<L>) -> Three<L> {
+    let u = [q[0], q[1], q[2]];
+    let inner = cross(lanes, u, scaled(lanes, q[3], arm, cross(lanes, u, arm)));
+    let scale = lanes.div_f32s(lanes.splat_f32s(2.0), squared(lanes, q));
+    add(lanes, v, scaled(lanes, scale, inner, carried))
 }

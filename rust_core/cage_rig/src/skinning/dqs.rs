@@ -14,104 +14,86 @@
 //!
 //! q̂ and −q̂ are the same motion: per vertex each bone takes the sign that is nearer to the bone of
 //! its largest weight (the first of equal ones). What the weights lack to 1 blends in as identity.
-//! Cost: 20 numbers per influence, 8 where no bone scales.
+//! Cost: 24 numbers per influence, 8 where no bone scales.
 
-use super::rotation::{matrix_of, rotation_of, Quaternion};
-use super::{each_vertex, SkinningInput};
-use crate::points::{Matrix3, Point, Transform};
-
-/// Scale and shear below this, relative, are rounding of single precision transforms.
-const RIGID: f64 = 1e-7;
-/// Weights that lack less than this to 1 lack nothing but rounding.
-pub(super) const COMPLETE: f32 = 1e-6;
-
-/// Real part and dual part of (R, t).
-const RIGID_PARTS: usize = 2;
-/// The same and the dual part of (1, (L − R) v) as the columns of a matrix.
-const AFFINE_PARTS: usize = 5;
+use super::blocks::{each_vertex, Mover, Row};
+use super::scratch::{Scratch, Turn};
+use super::vectors::{add, cross, scaled, squared, Three};
+use super::SkinningInput;
+use crate::points::{Point, Transform};
+use crate::simd::Lanes;
 
 /// M′ of a frame, in single precision.
-pub fn pose(input: &SkinningInput, posed: &mut [[f32; 3]]) {
-    let bones: Vec<[Quaternion; AFFINE_PARTS]> = input.transforms.iter().map(dual_quaternion).collect();
-    if bones.iter().all(|bone| bone[RIGID_PARTS..].iter().flatten().all(|x| x.abs() <= RIGID)) {
-        blend_bones::<RIGID_PARTS>(&bones, input, posed);
+pub fn pose(input: &SkinningInput, scratch: &mut Scratch, posed: &mut [[f32; 3]]) {
+    let pairs = input.weights.pairs();
+    if scratch.turn(input.transforms) {
+        let table = scratch.paired(pairs, 0..2, input.transforms, |turn, transform| {
+            let [q, d, ..] = dual_quaternion(turn, transform);
+            [q, d]
+        });
+        each_vertex(Rigid, table, input, posed);
     } else {
-        blend_bones::<AFFINE_PARTS>(&bones, input, posed);
+        let table = scratch.paired(pairs, 0..6, input.transforms, dual_quaternion);
+        each_vertex(Affine, table, input, posed);
     }
 }
 
-fn blend_bones<const N: usize>(
-    bones: &[[Quaternion; AFFINE_PARTS]],
-    input: &SkinningInput,
-    posed: &mut [[f32; 3]],
-) {
-    let single = |bone: &[Quaternion; AFFINE_PARTS]| std::array::from_fn(|k| bone[k].map(|x| x as f32));
-    let bones: Vec<[[f32; 4]; N]> = bones.iter().map(single).collect();
-    each_vertex(input, posed, |_, influences, v| moved(&bones, influences, v));
-}
-
-fn dual_quaternion(transform: &Transform) -> [Quaternion; AFFINE_PARTS] {
-    let q = rotation_of(&transform.linear);
-    let sheared: Matrix3 = transform.linear - matrix_of(q);
-    let [x, y, z] = [0, 1, 2].map(|column| dual_of(q, sheared.column(column).into()));
-    [q, dual_of(q, transform.translation), x, y, z]
+/// Real part, dual part of (R, t), and that of (1, (L − R) v) as the columns of a matrix.
+fn dual_quaternion(turn: &Turn, transform: &Transform) -> Row<6> {
+    let q = turn.quaternion;
+    let [x, y, z] = [0, 1, 2].map(|column| dual_of(q, turn.rest.column(column).into()));
+    [q, dual_of(q, transform.translation), x, y, z, [0.0; 4]].map(|part| part.map(|x| x as f32))
 }
 
 /// ½ t q.
-fn dual_of([x, y, z, w]: Quaternion, t: Point) -> Quaternion {
+fn dual_of([x, y, z, w]: [f64; 4], t: Point) -> [f64; 4] {
     let u = Point::new(x, y, z);
     let vector = (t * w + t.cross(&u)) / 2.0;
     [vector.x, vector.y, vector.z, -t.dot(&u) / 2.0]
 }
 
-/// v′ of one vertex.
-#[inline]
-fn moved<const N: usize>(bones: &[[[f32; 4]; N]], influences: &[(u32, f32)], v: [f32; 3]) -> [f32; 3] {
-    let Some(&(pivot, _)) = influences.first() else { return v };
-    let pivot = &bones[pivot as usize][0];
-    let mut blend = [[0.0f32; 4]; N];
-    let mut lack = 1.0f32;
-    for &(joint, weight) in influences {
-        let bone = &bones[joint as usize];
-        lack -= weight;
-        add_weighted(&mut blend, toward(pivot, &bone[0], weight), bone);
+#[derive(Clone, Copy)]
+struct Rigid;
+
+impl Mover<2> for Rigid {
+    const PAIRS: bool = true;
+    const CENTERS: bool = false;
+
+    #[inline(always)]
+    fn moved<L: Lanes>(lanes: L, rows: &[Row<2>], v: Three<L>, _: Three<L>) -> Three<L> {
+        moved(lanes, lanes.columns(rows, 0), lanes.columns(rows, 1), v)
     }
-    if lack > COMPLETE {
-        blend[0][3] += lack.copysign(pivot[3]);
+}
+
+#[derive(Clone, Copy)]
+struct Affine;
+
+impl Mover<6> for Affine {
+    const PAIRS: bool = true;
+    const CENTERS: bool = false;
+
+    #[inline(always)]
+    fn moved<L: Lanes>(lanes: L, rows: &[Row<6>], v: Three<L>, _: Three<L>) -> Three<L> {
+        let mut dual = lanes.columns(rows, 1);
+        for (column, x) in v.into_iter().enumerate() {
+            let part = lanes.columns(rows, 2 + column);
+            for k in 0..4 {
+                dual[k] = lanes.fused(part[k], x, dual[k]);
+            }
+        }
+        moved(lanes, lanes.columns(rows, 0), dual, v)
     }
-    let mut dual = blend[1];
-    for (column, x) in blend[RIGID_PARTS..].iter().zip(v) {
-        dual.iter_mut().zip(column).for_each(|(sum, d)| *sum += d * x);
-    }
-    let (q, d) = (blend[0], dual);
-    let (u, w) = ([q[0], q[1], q[2]], q[3]);
-    let turned = cross(u, v);
+}
+
+/// v′ under the blended real part q and dual part d.
+#[inline(always)]
+fn moved<L: Lanes>(lanes: L, q: [L::f32s; 4], d: [L::f32s; 4], v: Three<L>) -> Three<L> {
+    let u = [q[0], q[1], q[2]];
     // u × (u × v + w v + d_u) in one product.
-    let inner = cross(u, std::array::from_fn(|k| turned[k] + w * v[k] + d[k]));
-    let scale = 2.0 / squared(q);
-    std::array::from_fn(|k| v[k] + scale * (inner[k] + w * d[k] - d[3] * u[k]))
-}
-
-/// Adds `weight` times the parts of a bone.
-#[inline]
-pub(super) fn add_weighted<const N: usize>(sum: &mut [[f32; 4]; N], weight: f32, bone: &[[f32; 4]; N]) {
-    for (sum, part) in sum.iter_mut().zip(bone) {
-        sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += weight * x);
-    }
-}
-
-#[inline]
-pub(super) fn squared(q: [f32; 4]) -> f32 {
-    q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
-}
-
-/// `weight` with the sign that brings quaternion `q` to the half of the sphere of `pivot`.
-#[inline]
-pub(super) fn toward(pivot: &[f32; 4], q: &[f32; 4], weight: f32) -> f32 {
-    weight.copysign(q[0] * pivot[0] + q[1] * pivot[1] + q[2] * pivot[2] + q[3] * pivot[3])
-}
-
-#[inline]
-pub(super) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    let inner = add(lanes, cross(lanes, u, v), scaled(lanes, q[3], v, [d[0], d[1], d[2]]));
+    let turned = cross(lanes, u, inner);
+    let along = scaled(lanes, q[3], [d[0], d[1], d[2]], turned);
+    let step = scaled(lanes, lanes.neg_f32s(d[3]), u, along);
+    let scale = lanes.div_f32s(lanes.splat_f32s(2.0), squared(lanes, q));
+    scaled(lanes, scale, step, v)
 }

@@ -4,33 +4,39 @@
 //! transforms, moves it rigidly when all transforms are the same rigid motion, and never moves a
 //! vertex without weights.
 
+mod blocks;
 #[cfg(test)]
 mod center_tests;
 pub mod centers;
 pub mod cor;
 pub mod dqs;
+mod frame_weights;
 pub mod lbs;
 #[cfg(test)]
 pub(crate) mod naive;
 pub mod rotation;
+mod scratch;
 #[cfg(test)]
 mod tests;
+mod vectors;
+
+pub use frame_weights::FrameWeights;
+pub use scratch::Scratch;
 
 use crate::error::Error;
 use crate::points::Transform;
+use crate::simd::Path;
 use crate::weights::SkinWeights;
-use rayon::prelude::*;
-
-/// Below this many vertices one thread is faster than two.
-const PARALLEL_FROM: usize = 8192;
 
 /// What a frame needs, whatever the method.
 #[derive(Debug, Clone, Copy)]
 pub struct SkinningInput<'a> {
+    /// The instructions to use.
+    pub path: Path,
     /// T, one per joint, rig space.
     pub transforms: &'a [Transform],
     /// Ω, packed for the frame.
-    pub weights: &'a PackedWeights,
+    pub weights: &'a FrameWeights,
     /// M, `#M by 3`, rig space.
     pub rest_skin: &'a [[f32; 3]],
     /// p, `#M by 3`, rig space; read by methods that have `centers`.
@@ -49,7 +55,7 @@ pub struct SkinningMethod {
     /// Does it turn about centers of rotation?
     pub centers: bool,
     /// Writes M′ (`#M by 3`).
-    pub pose: fn(&SkinningInput, &mut [[f32; 3]]),
+    pub pose: fn(&SkinningInput, &mut Scratch, &mut [[f32; 3]]),
 }
 
 /// Every method there is. The first one is the default; a new one takes the next number.
@@ -68,27 +74,7 @@ pub fn method(name: &str) -> Result<&'static SkinningMethod, Error> {
     })
 }
 
-/// Writes `vertex(index, influences, rest position)` for every vertex, in threads where that pays.
-fn each_vertex(
-    input: &SkinningInput,
-    posed: &mut [[f32; 3]],
-    vertex: impl Fn(usize, &[(u32, f32)], [f32; 3]) -> [f32; 3] + Sync,
-) {
-    let chunk = if posed.len() < PARALLEL_FROM { PARALLEL_FROM } else { 2048 };
-    let pose_chunk = |(index, chunk_out): (usize, &mut [[f32; 3]])| {
-        for (i, out) in chunk_out.iter_mut().enumerate() {
-            let i = index * chunk + i;
-            *out = vertex(i, input.weights.row(i), input.rest_skin[i]);
-        }
-    };
-    if posed.len() < PARALLEL_FROM {
-        posed.chunks_mut(chunk).enumerate().for_each(pose_chunk);
-    } else {
-        posed.par_chunks_mut(chunk).enumerate().for_each(pose_chunk);
-    }
-}
-
-/// Ω in single precision, as the frame reads it: the influences of vertex `i` are entries
+/// Ω in single precision, as integrals read it: the influences of vertex `i` are entries
 /// `starts[i]..starts[i + 1]`, the largest (the first of equal ones) in front.
 #[derive(Debug, Clone)]
 pub struct PackedWeights {

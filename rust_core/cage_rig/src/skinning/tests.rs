@@ -1,15 +1,18 @@
 //! What every skinning method must do, by being in the table.
 
 use super::naive::ORACLES;
-use super::{method, PackedWeights, SkinningInput, SkinningMethod, METHODS};
+use super::{method, FrameWeights, Scratch, SkinningInput, SkinningMethod, METHODS};
 use crate::fixtures::{self, arm, random, Fixture};
 use crate::points::{to_f32, Matrix3, Point, Transform};
 use crate::rows::Rows;
-use crate::skinning::lbs::pose_points;
+use crate::simd::Path;
+use crate::skinning::lbs::pose_steps_into;
 use crate::weights::SkinWeights;
 
 /// The frame path must stay this near to double precision, relative to the size.
 const FRAME: f64 = 2e-6;
+/// The paths of different processors must stay this near to each other.
+const PATHS: f64 = 1e-6;
 
 fn weights(fixture: &Fixture) -> SkinWeights {
     SkinWeights::from_dense(&fixture.weights).expect("valid weights")
@@ -24,25 +27,37 @@ fn posed(method: &SkinningMethod, fixture: &Fixture, transforms: &[Transform]) -
     posed_about(method, fixture, transforms, &centers(fixture))
 }
 
+/// On the fastest path; the others must agree.
 fn posed_about(
     method: &SkinningMethod,
     fixture: &Fixture,
     transforms: &[Transform],
     centers: &[Point],
 ) -> Vec<[f32; 3]> {
-    let weights = PackedWeights::new(&weights(fixture));
+    let weights = FrameWeights::new(&weights(fixture));
     let (rest, centers) = (to_f32(&fixture.skin), to_f32(centers));
-    let mut out = vec![[f32::NAN; 3]; rest.len()];
-    let input = SkinningInput { transforms, weights: &weights, rest_skin: &rest, centers: &centers };
-    (method.pose)(&input, &mut out);
-    out
+    let on = |path| {
+        let mut out = vec![[f32::NAN; 3]; rest.len()];
+        let input =
+            SkinningInput { path, transforms, weights: &weights, rest_skin: &rest, centers: &centers };
+        (method.pose)(&input, &mut Scratch::default(), &mut out);
+        out
+    };
+    let found = on(Path::default());
+    let exact = fixtures::points(&found);
+    let size = size(fixture, &exact);
+    for path in Path::available() {
+        let apart = fixtures::distance(&fixtures::points(&on(path)), &exact);
+        assert!(apart <= PATHS * size, "{} {} {}: {apart:e}", method.name, path.name(), fixture.name);
+    }
+    found
 }
 
 /// The project's fixtures and some random ones (forests, empty rows, one bone, many).
 fn rigs() -> Vec<Fixture> {
     let mut rigs = fixtures::all();
     for seed in 0..12 {
-        let (skin_vertices, joints) = (60, 1 + 3 * seed as usize);
+        let (skin_vertices, joints) = ([60, 2, 7, 8, 33, 95][seed as usize % 6], 1 + 3 * seed as usize);
         rigs.push(random::rig(random::Recipe { skin_vertices, joints, cage_level: 0, seed }));
     }
     rigs
@@ -53,7 +68,13 @@ fn frame_error(method: &SkinningMethod, fixture: &Fixture, transforms: &[Transfo
     let oracle = ORACLES.iter().find(|(name, _)| *name == method.name).expect("every method has an oracle").1;
     let expected = oracle(transforms, &normalised(fixture), &fixture.skin, &centers(fixture));
     let frame = fixtures::points(&posed(method, fixture, transforms));
-    fixtures::distance(&frame, &expected) / fixture.size().max(crate::bounding_diagonal(&expected))
+    fixtures::distance(&frame, &expected) / size(fixture, &expected)
+}
+
+/// What tolerances are relative to: the skin at rest or posed, whichever is larger.
+fn size(fixture: &Fixture, posed: &[Point]) -> f64 {
+    let alone = if posed.len() == 1 { crate::bounding_diagonal(&fixture.cage) } else { 0.0 };
+    fixture.size().max(crate::bounding_diagonal(posed)).max(alone)
 }
 
 /// The reflection x ↦ c − x along the first axis.
@@ -72,6 +93,33 @@ fn identity_pose_leaves_the_rest_pose() {
         for fixture in rigs() {
             let identity = vec![Transform::identity(); fixture.joints.len()];
             assert_eq!(posed(method, &fixture, &identity), to_f32(&fixture.skin), "{}", fixture.name);
+        }
+    }
+}
+
+#[test]
+fn any_number_of_vertices_and_influences_agrees_with_the_oracle() {
+    let mut random = random::Random::new(12);
+    for influences in 0..=12 {
+        for count in [1, 2, 5, 31, 32, 33, 64, 100] {
+            let mut fixture = random::rig(random::Recipe {
+                skin_vertices: count,
+                joints: 14,
+                cage_level: 0,
+                seed: influences as u64,
+            });
+            for i in 0..count {
+                fixture.weights.row_mut(i).fill(0.0);
+                // Every vertex its own number, up to so many.
+                for k in 0..influences * (i + 1) / count {
+                    fixture.weights.row_mut(i)[(3 * k + i) % 14] = random.between(0.01, 1.0);
+                }
+            }
+            let pose = random::pose(&fixture, 2.0, 4);
+            for method in METHODS {
+                let error = frame_error(method, &fixture, &pose);
+                assert!(error <= FRAME, "{} {influences} {count}: {error:e}", method.name);
+            }
         }
     }
 }
@@ -256,15 +304,17 @@ fn what_the_weights_lack_to_one_stands_still() {
         }
         complete.row_mut(i)[3] = 0.2;
     }
-    let packed = |rows: &Rows| PackedWeights::new(&SkinWeights::from_blended(rows));
+    let packed = |rows: &Rows| FrameWeights::new(&SkinWeights::from_blended(rows));
     let still = [pose.clone(), vec![Transform::identity()]].concat();
     let (rest, centers) = (to_f32(&fixture.skin), to_f32(&centers(&fixture)));
     for method in METHODS {
         let mut out = [rest.clone(), rest.clone()];
         for (out, (weights, transforms)) in out.iter_mut().zip([(&partial, &pose), (&complete, &still)]) {
             let weights = packed(weights);
-            let input = SkinningInput { transforms, weights: &weights, rest_skin: &rest, centers: &centers };
-            (method.pose)(&input, out);
+            let path = Path::default();
+            let input =
+                SkinningInput { path, transforms, weights: &weights, rest_skin: &rest, centers: &centers };
+            (method.pose)(&input, &mut Scratch::default(), out);
         }
         let [a, b] = out.map(|out| fixtures::points(&out));
         assert!(fixtures::distance(&a, &b) <= FRAME * fixture.size(), "{}", method.name);
@@ -303,7 +353,9 @@ fn double_precision_blending_equals_the_oracle() {
     for fixture in fixtures::all() {
         let pose = fixtures::lively_pose(&fixture, 1.5);
         let expected = super::naive::lbs(&pose, &normalised(&fixture), &fixture.skin);
-        let found = pose_points(&pose, &weights(&fixture), &fixture.skin);
+        let mut steps = Vec::new();
+        pose_steps_into(&pose, &weights(&fixture), &fixture.skin, &mut steps);
+        let found: Vec<Point> = fixture.skin.iter().zip(&steps).map(|(v, step)| v + step).collect();
         assert!(fixtures::distance(&found, &expected) <= 1e-13 * fixture.size(), "{}", fixture.name);
     }
 }

@@ -15,12 +15,14 @@ use crate::cage::Cage;
 use crate::coordinates::CoordinateKind;
 use crate::error::{Error, SkinError, WeightsError};
 use crate::mesh::{triangulate, FaceFault, Polygons};
+use crate::panels::Precision;
 use crate::points::{bounding_diagonal, first_unusable, Point};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
+use crate::simd::Path;
 use crate::skeleton::Skeleton;
 use crate::skinning::centers::{centers, CenterOptions};
-use crate::skinning::{PackedWeights, SkinningMethod};
+use crate::skinning::{FrameWeights, PackedWeights, SkinningMethod};
 use crate::weights::SkinWeights;
 use std::collections::HashSet;
 
@@ -75,6 +77,10 @@ pub struct BindOptions {
     pub centers: CenterOptions,
     /// Outside the cage its effect falls to nothing over this many mean cage edges.
     pub falloff: f64,
+    /// The instructions that frames use; the fastest that the processor has.
+    pub path: Path,
+    /// How frames keep Φ and Λ; single precision.
+    pub precision: Precision,
 }
 
 impl Default for BindOptions {
@@ -85,6 +91,8 @@ impl Default for BindOptions {
             min_singular: 5e-3,
             centers: CenterOptions::default(),
             falloff: 1.0,
+            path: Path::default(),
+            precision: Precision::default(),
         }
     }
 }
@@ -128,7 +136,10 @@ pub struct Binding {
     pub(super) reach: Option<Vec<f32>>,
     pub(super) anchors: Vec<usize>,
     pub(super) rest_skin: RestSkin,
-    pub(super) packed_weights: PackedWeights,
+    pub(super) frame_weights: FrameWeights,
+    pub(super) path: Path,
+    precision: Precision,
+    packed_weights: PackedWeights,
     skin_triangles: Vec<[u32; 3]>,
     center_options: CenterOptions,
     pub(super) cage_updater: CageUpdater,
@@ -204,7 +215,10 @@ impl Binding {
             center_coords,
             reach: (report.vertices_outside > 0).then(|| reach.iter().map(|part| *part as f32).collect()),
             anchors: chosen.rows,
-            rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords, &stages.frame)?,
+            rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords, options.precision, &stages.frame)?,
+            frame_weights: FrameWeights::new(&weights),
+            path: options.path,
+            precision: options.precision,
             packed_weights: PackedWeights::new(&weights),
             skin_triangles: triangles,
             center_options: options.centers,
@@ -241,14 +255,14 @@ impl Binding {
             (0..skin.len()).map(|i| Point::from_row_slice(&found.row(i)[columns..])).collect();
         let mut coords = Rows::zeros(skin.len(), columns);
         (0..skin.len()).for_each(|i| coords.row_mut(i).copy_from_slice(&found.row(i)[..columns]));
-        RestCenters::new(coords, &at_bind, self.cage.vertices(), &packing)
+        RestCenters::new(coords, &at_bind, self.cage.vertices(), self.precision, &packing)
     }
 
     /// Centers of rotation p₀ = Λ C₀ under a given Λ (`coords`, `#M by #C`).
     pub(super) fn given_centers(&self, coords: Rows, part: &Part) -> Result<RestCenters, Cancelled> {
         let cage = self.cage.vertices();
         let at_bind = coords.times(cage);
-        RestCenters::new(coords, &at_bind, cage, part)
+        RestCenters::new(coords, &at_bind, cage, self.precision, part)
     }
 }
 

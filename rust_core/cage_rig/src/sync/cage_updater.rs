@@ -14,7 +14,7 @@ use crate::linalg::{product, svd, Lu};
 use crate::points::{Matrix3, Point, Transform};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
-use crate::skinning::lbs::{blended_linear, pose_points};
+use crate::skinning::lbs::{blended_linear, pose_steps_into};
 use crate::weights::SkinWeights;
 
 /// Skin vertices between two looks at the progress.
@@ -29,6 +29,15 @@ pub struct CageUpdater {
     cage: Vec<Point>,
     fit: Fit,
     condition: f64,
+}
+
+/// What a fit works with.
+#[derive(Debug, Clone, Default)]
+pub struct FitScratch {
+    moved: Vec<Point>,
+    rest: Vec<Point>,
+    steps: Vec<Point>,
+    numbers: Vec<f64>,
 }
 
 /// How the cage is found from the anchors.
@@ -86,20 +95,35 @@ impl CageUpdater {
 
     /// The posed cage C′ (`#C by 3`) of rest cage `cage` (C) under `transforms`, Eq. (8).
     pub fn posed_cage(&self, cage: &[Point], transforms: &[Transform]) -> Vec<Point> {
-        let moved: Vec<Point> = cage.iter().zip(&self.cage).map(|(c, c0)| c - c0).collect();
-        let rest: Vec<Point> = (0..self.anchor_rest.len())
-            .map(|i| self.anchor_rest[i] + self.anchor_coords.combine(i, &moved))
-            .collect();
-        let posed = pose_points(transforms, &self.anchor_weights, &rest);
-        let steps: Vec<Point> = posed.iter().zip(&rest).map(|(p, r)| p - r).collect();
+        let mut posed = Vec::new();
+        self.posed_cage_into(cage, transforms, &mut FitScratch::default(), &mut posed);
+        posed
+    }
+
+    /// The same, written into `posed`.
+    pub fn posed_cage_into(
+        &self,
+        cage: &[Point],
+        transforms: &[Transform],
+        scratch: &mut FitScratch,
+        posed: &mut Vec<Point>,
+    ) {
+        let FitScratch { moved, rest, steps, numbers } = scratch;
+        moved.clear();
+        moved.extend(cage.iter().zip(&self.cage).map(|(c, c0)| c - c0));
+        self.anchor_coords.times_into(moved, rest);
+        rest.iter_mut().zip(&self.anchor_rest).for_each(|(moved, rest)| *moved += rest);
+        pose_steps_into(transforms, &self.anchor_weights, rest, steps);
         match &self.fit {
-            Fit::Exact(lu) => add(cage, &lu.solve_points(&steps)),
+            Fit::Exact(lu) => lu.solve_points_into(steps, numbers, posed),
             Fit::Regularised { from_anchors, from_cage, cage_weights, .. } => {
-                let skinned = pose_points(transforms, cage_weights, cage);
-                let cage_steps: Vec<Point> = skinned.iter().zip(cage).map(|(s, c)| s - c).collect();
-                add(&add(cage, &from_anchors.times(&steps)), &from_cage.times(&cage_steps))
+                from_anchors.times_into(steps, posed);
+                pose_steps_into(transforms, cage_weights, cage, steps);
+                from_cage.times_into(steps, rest);
+                posed.iter_mut().zip(&*rest).for_each(|(posed, step)| *posed += step);
             }
         }
+        posed.iter_mut().zip(cage).for_each(|(step, c)| *step += c);
     }
 
     pub(super) fn side(&self) -> Side<'_> {
@@ -125,10 +149,6 @@ impl CageUpdater {
     pub(super) fn anchor_linear(&self, linear: &[Matrix3]) -> Vec<Matrix3> {
         blended_linear(linear, &self.anchor_weights)
     }
-}
-
-fn add(a: &[Point], b: &[Point]) -> Vec<Point> {
-    a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
 fn fit(

@@ -3,6 +3,7 @@
 
 use super::bind::Binding;
 use super::reach::Surroundings;
+use super::rest_skin::Confines;
 use crate::points::{to_f32, Point};
 use crate::progress::{unwatched, Cancelled, Part};
 
@@ -75,30 +76,47 @@ impl Ground {
         changed
     }
 
-    /// Of the cage's movement, the part at each skin vertex; none: all of it.
-    pub fn mask(&self) -> Option<&[f32]> {
-        self.mask.as_deref()
-    }
-
     /// Of the cage's movement, the part at each joint.
     pub fn shares(&self) -> &[f64] {
         &self.shares
     }
 
-    /// What the visible skin is offset by.
-    pub fn offsets(&self) -> Option<&[[f32; 3]]> {
-        self.offsets.as_deref()
+    /// Of the cage's movement, the part at each skin vertex; none: all of it.
+    pub fn mask(&self) -> Option<&[f32]> {
+        self.mask.as_deref()
+    }
+
+    /// What takes part in the rest skin beside the cage.
+    pub fn confines<'a>(&'a self, binding: &Binding) -> Confines<'a> {
+        let (mask, offsets) = (self.mask.as_deref(), self.offsets.as_deref());
+        Confines { path: binding.path, mask, offsets }
     }
 
     /// The rest cage `cage` where the lower cage has carried it, `#C by 3`.
     pub fn cage(&self, cage: &[Point]) -> Vec<Point> {
-        self.carried.as_ref().map_or_else(|| cage.to_vec(), |carried| sum(cage, &carried.cage))
+        let mut carried = Vec::new();
+        self.cage_into(cage, &mut carried);
+        carried
+    }
+
+    /// The same, written into `out`.
+    pub fn cage_into(&self, cage: &[Point], out: &mut Vec<Point>) {
+        out.clear();
+        out.extend_from_slice(cage);
+        self.carried.iter().for_each(|carried| add(out, &carried.cage));
     }
 
     /// Rest joints of the rest cage `cage` (`#C by 3`), Eq. (13).
     pub fn joints(&self, binding: &Binding, cage: &[Point]) -> Vec<Point> {
-        let joints = binding.skeleton_updater.joints(cage, &self.shares);
-        self.carried.as_ref().map_or_else(|| joints.clone(), |carried| sum(&joints, &carried.joints))
+        let mut joints = Vec::new();
+        self.joints_into(binding, cage, &mut joints);
+        joints
+    }
+
+    /// The same, written into `out`.
+    pub fn joints_into(&self, binding: &Binding, cage: &[Point], out: &mut Vec<Point>) {
+        binding.skeleton_updater.joints_into(cage, &self.shares, out);
+        self.carried.iter().for_each(|carried| add(out, &carried.joints));
     }
 }
 
@@ -107,6 +125,6 @@ fn surroundings(binding: &Binding, part: &Part) -> Result<Surroundings, Cancelle
     Surroundings::new(binding.rest_skin.at_bind(), joints, part)
 }
 
-fn sum(a: &[Point], b: &[Point]) -> Vec<Point> {
-    a.iter().zip(b).map(|(a, b)| a + b).collect()
+fn add(sum: &mut [Point], other: &[Point]) {
+    sum.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
 }

@@ -12,9 +12,12 @@
 //! Joints and transforms follow at once. The three large arrays are remade when they are read, so
 //! that a frame pays for what it shows: `Stale` is the one place that knows which are due.
 
+mod bake_frames;
 pub mod bind;
 pub mod cage_reverser;
 pub mod cage_updater;
+mod drag;
+mod frame;
 mod ground;
 pub mod joint_coordinates;
 pub mod max_entropy;
@@ -22,39 +25,37 @@ pub mod maxvol;
 pub mod reach;
 pub mod rest_centers;
 pub mod rest_skin;
+mod reverse;
 pub mod skeleton_updater;
 pub mod stages;
 mod work;
 
 #[cfg(test)]
+mod frame_tests;
+#[cfg(test)]
 mod naive;
 #[cfg(test)]
 mod tests;
 
+pub use bake_frames::Frame;
 pub use bind::{BindInput, BindOptions, Binding, Known, Report};
 pub use ground::Carried;
 pub use work::Work;
 
 use crate::cage::Cage;
 use crate::error::{CageError, Error, PoseError, SkinError};
-use crate::points::{bounding_diagonal, first_unusable, Matrix3, Point, Transform};
+use crate::points::{first_unusable, Matrix3, Point, Transform};
 use crate::progress::{unwatched, Cancelled, Part, Progress};
 use crate::rows::Rows;
-use crate::skinning::{SkinningInput, SkinningMethod};
+use crate::skinning::SkinningMethod;
 use cage_reverser::CageReverser;
+use frame::Buffers;
 use ground::Ground;
 use rest_centers::RestCenters;
 use skeleton_updater::JointMotion;
 use stages::Stages;
 use std::sync::Arc;
 use work::Stale;
-
-/// A posed cage edit has arrived when it misses by this part of the size.
-const ARRIVED: f64 = 1e-12;
-/// An edit that ends farther away than this is refused.
-const REACHED: f64 = 1e-10;
-/// Solves an edit may take: one, and refinements where Eq. (19) is badly conditioned.
-const SOLVES: usize = 4;
 
 /// Centers of rotation that a rig has not needed yet. Knows all that they depend on.
 #[derive(Debug, Clone)]
@@ -81,6 +82,7 @@ pub struct CoupledRig {
     rest_skin: Vec<[f32; 3]>,
     posed_skin: Vec<[f32; 3]>,
     posed_cage: Vec<Point>,
+    buffers: Buffers,
     stale: Stale,
     reverser: Option<CageReverser>,
     work: Work,
@@ -114,6 +116,7 @@ impl CoupledRig {
             posed_skin: rest.clone(),
             rest_skin: rest,
             posed_cage: binding.cage.vertices().to_vec(),
+            buffers: Buffers::new(binding.cage.vertices()),
             stale: Stale::default(),
             reverser: None,
             work: Work { anchor_factorisations: 1, ..Work::default() },
@@ -130,15 +133,15 @@ impl CoupledRig {
     /// The bones move: `transforms` (one per joint) as the animation measures them at
     /// `rest_joints` (`#J by 3`; the joints of the bind if not given).
     pub fn pose(&mut self, transforms: &[Transform], rest_joints: Option<&[Point]>) -> Result<(), PoseError> {
-        let motions = self.read_motions(transforms, rest_joints)?;
-        self.propagate(None, Some(motions));
+        self.read_motions(transforms, rest_joints)?;
+        self.propagate(None, true);
         Ok(())
     }
 
     /// The artist moves the rest cage to `cage` (`#C by 3`).
     pub fn edit_rest_cage(&mut self, cage: &[Point]) -> Result<(), PoseError> {
         self.check_cage(cage)?;
-        self.propagate(Some(cage), None);
+        self.propagate(Some(cage), false);
         Ok(())
     }
 
@@ -150,7 +153,7 @@ impl CoupledRig {
             return Ok(());
         }
         let cage = self.reverse(wanted)?;
-        self.propagate(Some(&cage), None);
+        self.propagate(Some(&cage), false);
         // The artist's own numbers, which the fit repeats to rounding.
         self.posed_cage.copy_from_slice(wanted);
         self.stale.posed_cage = false;
@@ -165,8 +168,8 @@ impl CoupledRig {
         rest_joints: Option<&[Point]>,
     ) -> Result<(), PoseError> {
         self.check_cage(cage)?;
-        let motions = self.read_motions(transforms, rest_joints)?;
-        self.propagate(Some(cage), Some(motions));
+        self.read_motions(transforms, rest_joints)?;
+        self.propagate(Some(cage), true);
         Ok(())
     }
 
@@ -201,6 +204,8 @@ impl CoupledRig {
         }
         if self.ground.set_mask(&self.binding, mask) {
             self.reverser = None;
+            self.buffers.drag.forget();
+            self.centers.iter_mut().for_each(RestCenters::forget);
             self.rest_skin_changed();
             self.refit();
         }
@@ -251,23 +256,25 @@ impl CoupledRig {
         self.method
     }
 
-    /// The only place that knows what follows from what. What is given and equal to what is there
-    /// changes nothing.
-    fn propagate(&mut self, cage: Option<&[Point]>, motions: Option<Vec<JointMotion>>) {
+    /// The only place that knows what follows from what. `motions`: those just read count. What is
+    /// given and equal to what is there changes nothing.
+    fn propagate(&mut self, cage: Option<&[Point]>, motions: bool) {
         let cage = cage.filter(|cage| *cage != self.rest_cage.as_slice());
-        let motions = motions.filter(|motions| *motions != self.motions);
-        if cage.is_none() && motions.is_none() {
+        let motions = motions && self.buffers.motions != self.motions;
+        if cage.is_none() && !motions {
             return;
         }
         if let Some(cage) = cage {
             self.rest_cage.copy_from_slice(cage);
             self.rest_skin_changed();
         }
-        if let Some(motions) = motions {
+        if motions {
+            std::mem::swap(&mut self.buffers.motions, &mut self.motions);
             // Eq. (19) depends on the linear parts alone.
-            let turned = motions.iter().zip(&self.motions).any(|(new, old)| new.linear != old.linear);
-            self.reverser = self.reverser.take().filter(|_| !turned);
-            self.motions = motions;
+            let turned = |(new, old): (&JointMotion, &JointMotion)| new.linear != old.linear;
+            if self.motions.iter().zip(&self.buffers.motions).any(turned) {
+                self.reverser = None;
+            }
         }
         self.refit();
     }
@@ -280,51 +287,10 @@ impl CoupledRig {
 
     /// Joints and transforms anew, and all that is posed by them.
     fn refit(&mut self) {
-        self.joints = self.ground.joints(&self.binding, &self.rest_cage);
-        self.transforms = self.binding.skeleton_updater.transforms(&self.motions, &self.joints);
+        self.ground.joints_into(&self.binding, &self.rest_cage, &mut self.joints);
+        self.binding.skeleton_updater.transforms_into(&self.motions, &self.joints, &mut self.transforms);
         self.stale.posed_skin = true;
         self.stale.posed_cage = true;
-    }
-
-    /// The rest cage whose posed cage is `wanted`. Changes nothing but the kept factors.
-    fn reverse(&mut self, wanted: &[Point]) -> Result<Vec<Point>, PoseError> {
-        let reverser = match self.reverser.take() {
-            Some(reverser) => reverser,
-            None => {
-                self.work.reverse_factorisations += 1;
-                let linear: Vec<Matrix3> = self.motions.iter().map(|m| m.linear).collect();
-                let Binding { cage_updater, skeleton_updater, .. } = &*self.binding;
-                CageReverser::new(cage_updater, skeleton_updater, &linear, self.ground.shares())?
-            }
-        };
-        let mut cage = self.rest_cage.clone();
-        let mut reached = self.posed_cage.clone();
-        let mut miss = f64::INFINITY;
-        for _ in 0..SOLVES {
-            let step: Vec<Point> = wanted.iter().zip(&reached).map(|(w, r)| w - r).collect();
-            let change = reverser.solve(&step);
-            let next: Vec<Point> = cage.iter().zip(&change).map(|(c, d)| c + d).collect();
-            let joints = self.ground.joints(&self.binding, &next);
-            let transforms = self.binding.skeleton_updater.transforms(&self.motions, &joints);
-            let posed = self.binding.cage_updater.posed_cage(&self.ground.cage(&next), &transforms);
-            self.work.reverse_solves += 1;
-            self.work.cage_fits += 1;
-            let next_miss =
-                largest_distance(&posed, wanted) / bounding_diagonal(self.binding.cage.vertices());
-            if next_miss.is_nan() || next_miss >= 0.5 * miss {
-                break;
-            }
-            (cage, reached, miss) = (next, posed, next_miss);
-            if miss <= ARRIVED {
-                break;
-            }
-        }
-        self.reverser = Some(reverser);
-        if miss <= REACHED {
-            Ok(cage)
-        } else {
-            Err(PoseError::Unreachable { miss })
-        }
     }
 
     fn check_cage(&self, cage: &[Point]) -> Result<(), PoseError> {
@@ -341,62 +307,31 @@ impl CoupledRig {
         first_unusable(joints).map_or(Ok(()), |joint| Err(PoseError::JointNotFinite { joint }))
     }
 
-    fn read_motions(
+    fn check_transforms(
         &self,
         transforms: &[Transform],
         rest_joints: Option<&[Point]>,
-    ) -> Result<Vec<JointMotion>, PoseError> {
-        let skeleton = self.binding.skeleton_updater.skeleton();
-        let rest_joints = rest_joints.unwrap_or(skeleton.joints());
-        if transforms.len() != skeleton.len() {
-            return Err(PoseError::TransformCount { expected: skeleton.len(), found: transforms.len() });
+    ) -> Result<(), PoseError> {
+        if transforms.len() != self.joints.len() {
+            return Err(PoseError::TransformCount { expected: self.joints.len(), found: transforms.len() });
         }
         if let Some(joint) = transforms.iter().position(|t| !t.is_usable()) {
             return Err(PoseError::TransformNotFinite { joint });
         }
-        self.check_joints(rest_joints)?;
-        Ok(self.binding.skeleton_updater.motions(transforms, rest_joints))
+        rest_joints.map_or(Ok(()), |joints| self.check_joints(joints))
     }
 
-    /// Rest skin M, `#M by 3`.
-    pub fn rest_skin(&mut self) -> &[[f32; 3]] {
-        if self.stale.rest_skin {
-            let (mask, offsets) = (self.ground.mask(), self.ground.offsets());
-            self.binding.rest_skin.write(&self.rest_cage, mask, offsets, &mut self.rest_skin);
-            self.work.rest_passes += 1;
-            self.stale.rest_skin = false;
-        }
-        &self.rest_skin
-    }
-
-    /// Posed skin M′, `#M by 3`.
-    pub fn posed_skin(&mut self) -> &[[f32; 3]] {
-        self.rest_skin();
-        if self.stale.posed_skin {
-            let needed = self.centers.as_mut().filter(|_| self.method.centers);
-            let centers = needed.map_or(&[][..], |centers| {
-                let (mask, offsets) = (self.ground.mask(), self.ground.offsets());
-                self.work.center_passes += usize::from(centers.update(&self.rest_cage, mask, offsets));
-                centers.centers()
-            });
-            let (transforms, weights) = (&self.transforms, &self.binding.packed_weights);
-            let input = SkinningInput { transforms, weights, rest_skin: &self.rest_skin, centers };
-            (self.method.pose)(&input, &mut self.posed_skin);
-            self.work.skin_passes += 1;
-            self.stale.posed_skin = false;
-        }
-        &self.posed_skin
-    }
-
-    /// Posed cage C′, `#C by 3`.
-    pub fn posed_cage(&mut self) -> &[Point] {
-        if self.stale.posed_cage {
-            let cage = self.ground.cage(&self.rest_cage);
-            self.posed_cage = self.binding.cage_updater.posed_cage(&cage, &self.transforms);
-            self.work.cage_fits += 1;
-            self.stale.posed_cage = false;
-        }
-        &self.posed_cage
+    /// Reads the animation's R_j and d_j into the buffer for them.
+    fn read_motions(
+        &mut self,
+        transforms: &[Transform],
+        rest_joints: Option<&[Point]>,
+    ) -> Result<(), PoseError> {
+        self.check_transforms(transforms, rest_joints)?;
+        let updater = &self.binding.skeleton_updater;
+        let rest_joints = rest_joints.unwrap_or(updater.skeleton().joints());
+        updater.motions_into(transforms, rest_joints, &mut self.buffers.motions);
+        Ok(())
     }
 
     /// Rest cage C, `#C by 3`.
@@ -475,11 +410,4 @@ impl CoupledRig {
     pub fn work(&self) -> Work {
         self.work
     }
-}
-
-fn largest_distance(a: &[Point], b: &[Point]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b).norm())
-        .fold(0.0, |most, d| if d > most || d.is_nan() { d } else { most })
 }

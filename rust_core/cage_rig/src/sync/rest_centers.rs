@@ -3,7 +3,9 @@
 //! [CTL*20] Eq. (14), p = Λ C. The same product as Eq. (7) with Λ for Φ, so in the same delta form:
 //! p = p₀ + Λ (C − C₀), in single precision. Where the cage reaches the whole skin, p₀ = Λ C₀.
 
-use super::rest_skin::RestSkin;
+use super::drag::{Drag, Pass};
+use super::rest_skin::{Confines, RestSkin};
+use crate::panels::Precision;
 use crate::points::Point;
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
@@ -14,14 +16,25 @@ pub struct RestCenters {
     coords: Rows,
     mover: RestSkin,
     centers: Vec<[f32; 3]>,
+    drag: Drag,
     stale: bool,
 }
 
 impl RestCenters {
     /// Keeps `coords` (Λ, `#M by #C`), the centers `at_bind` (p₀, `#M by 3`) and `cage` (C₀, `#C by 3`).
-    pub fn new(coords: Rows, at_bind: &[Point], cage: &[Point], part: &Part) -> Result<Self, Cancelled> {
-        let mover = RestSkin::new(at_bind, cage, &coords, part)?;
-        Ok(Self { coords, centers: mover.at_bind().to_vec(), mover, stale: true })
+    pub fn new(
+        coords: Rows,
+        at_bind: &[Point],
+        cage: &[Point],
+        precision: Precision,
+        part: &Part,
+    ) -> Result<Self, Cancelled> {
+        let mover = RestSkin::new(at_bind, cage, &coords, precision, part)?;
+        Ok(Self { coords, centers: mover.at_bind().to_vec(), mover, drag: Drag::new(cage), stale: true })
+    }
+
+    pub(super) fn mover(&self) -> &RestSkin {
+        &self.mover
     }
 
     /// Λ.
@@ -34,15 +47,17 @@ impl RestCenters {
         self.stale = true;
     }
 
-    /// Makes the centers those of `cage` (C, `#C by 3`); true if that was work. A center takes part in
-    /// what confines or offsets its vertex (`mask` and `offsets`, as of the rest skin).
-    pub fn update(&mut self, cage: &[Point], mask: Option<&[f32]>, offsets: Option<&[[f32; 3]]>) -> bool {
-        let work = self.stale;
-        if work {
-            self.mover.write(cage, mask, offsets, &mut self.centers);
-            self.stale = false;
-        }
-        work
+    /// What confines the rest skin has changed.
+    pub fn forget(&mut self) {
+        self.stale = true;
+        self.drag.forget();
+    }
+
+    /// Makes the centers those of `cage` (C, `#C by 3`); the pass that this took, if any. A center takes
+    /// part in what confines or offsets its vertex.
+    pub fn update(&mut self, cage: &[Point], confines: &Confines) -> Option<Pass> {
+        let due = std::mem::take(&mut self.stale);
+        due.then(|| self.mover.write(cage, confines, &mut self.drag, &mut self.centers))
     }
 
     /// p, `#M by 3`, as of the last update.

@@ -3,40 +3,47 @@
 //! [CTL*20] Eq. (7), M = Φ C, in delta form: M = M₀ + Φ (C − C₀). Exact at rest whatever rounding
 //! is in Φ, and only the columns of cage vertices that moved cost anything: `#M` per moved vertex.
 
-use crate::points::{to_f32, Point};
+use super::drag::{Columns, Drag, Pass};
+use crate::panels::{Panels, Precision, Product, Step, FRAMES};
+use crate::points::{to_f32, to_single, Point};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
-use rayon::prelude::*;
+use crate::simd::Path;
 
-/// Rows worked on at once: three sums and a column piece stay in the first cache.
-const PANEL: usize = 1024;
-/// Below this many vertices one thread is faster than two.
-const PARALLEL_FROM: usize = 8192;
+/// Numbers of Φ from which on four frames are made of one walk: below, Φ stays in the caches.
+const TOGETHER_FROM: usize = 1 << 20;
 
-/// M₀, C₀ and Φ, column by column.
+/// M₀, C₀ and Φ.
 #[derive(Debug, Clone)]
 pub struct RestSkin {
     skin: Vec<[f32; 3]>,
     cage: Vec<Point>,
-    columns: Vec<f32>,
+    coords: Panels,
+}
+
+/// What takes part in a pass beside the cage.
+#[derive(Debug, Clone, Copy)]
+pub struct Confines<'a> {
+    /// The instructions to use.
+    pub path: Path,
+    /// Of the cage's movement, the part at every vertex, `#M`; none: all of it.
+    pub mask: Option<&'a [f32]>,
+    /// Added at the end, `#M by 3`.
+    pub offsets: Option<&'a [[f32; 3]]>,
 }
 
 impl RestSkin {
     /// Keeps `skin` (`#M by 3`) and `cage` (`#C by 3`) of the bind and `cage_coords`
     /// (`#M by #C`).
-    pub fn new(skin: &[Point], cage: &[Point], cage_coords: &Rows, part: &Part) -> Result<Self, Cancelled> {
-        let count = skin.len();
-        let mut columns = vec![0.0; count * cage.len()];
-        // Sixteen columns at a time: a row of Φ is read from memory once for all of them.
-        let blocks = part.count(cage.len().div_ceil(16));
-        columns.par_chunks_mut(16 * count.max(1)).enumerate().try_for_each(|(block, columns)| {
-            for i in 0..count {
-                let entries = &cage_coords.row(i)[16 * block..];
-                columns[i..].iter_mut().step_by(count).zip(entries).for_each(|(x, phi)| *x = *phi as f32);
-            }
-            blocks.step(1)
-        })?;
-        Ok(Self { skin: to_f32(skin), cage: cage.to_vec(), columns })
+    pub fn new(
+        skin: &[Point],
+        cage: &[Point],
+        cage_coords: &Rows,
+        precision: Precision,
+        part: &Part,
+    ) -> Result<Self, Cancelled> {
+        let coords = Panels::new(cage_coords, precision, part)?;
+        Ok(Self { skin: to_f32(skin), cage: cage.to_vec(), coords })
     }
 
     /// M₀, `#M by 3`.
@@ -44,60 +51,66 @@ impl RestSkin {
         &self.skin
     }
 
-    /// Writes M for `cage` (C, `#C by 3`), of whose movement every vertex takes part by `mask` (`#M`;
-    /// none: wholly); `offsets` (`#M by 3`, or none) are added.
-    pub fn write(
-        &self,
-        cage: &[Point],
-        mask: Option<&[f32]>,
-        offsets: Option<&[[f32; 3]]>,
-        rest: &mut [[f32; 3]],
-    ) {
-        let moved: Vec<(usize, [f32; 3])> = (0..cage.len())
-            .filter(|&k| cage[k] != self.cage[k])
-            .map(|k| (k, (cage[k] - self.cage[k]).map(|x| x as f32).into()))
-            .collect();
-        let panel = |(index, out): (usize, &mut [[f32; 3]])| {
-            self.write_panel(index * PANEL, &moved, mask, offsets, out);
-        };
-        if rest.len() < PARALLEL_FROM {
-            rest.chunks_mut(PANEL).enumerate().for_each(panel);
-        } else {
-            rest.par_chunks_mut(PANEL).enumerate().for_each(panel);
-        }
+    pub(super) fn coords(&self) -> &Panels {
+        &self.coords
     }
 
-    fn write_panel(
+    /// Writes M for `cage` (C, `#C by 3`) over `rest`, the result of the last pass of `drag`.
+    pub fn write(&self, cage: &[Point], confines: &Confines, drag: &mut Drag, rest: &mut [[f32; 3]]) -> Pass {
+        let Confines { path, mask, offsets } = *confines;
+        let pass = match drag.to(cage, self, confines, rest) {
+            Some(Columns { panels, steps, from }) => {
+                panels.write(&Product { path, from, mask, offsets }, steps, rest);
+                Pass::Columns
+            }
+            None => {
+                self.write_whole(cage, confines, &mut drag.steps, rest);
+                Pass::Whole
+            }
+        };
+        drag.done(cage, pass, confines);
+        pass
+    }
+
+    /// Writes M for `cage` from all columns that are not as bound.
+    pub(super) fn write_whole(
         &self,
-        first: usize,
-        moved: &[(usize, [f32; 3])],
-        mask: Option<&[f32]>,
-        offsets: Option<&[[f32; 3]]>,
-        out: &mut [[f32; 3]],
+        cage: &[Point],
+        confines: &Confines,
+        steps: &mut Vec<Step>,
+        rest: &mut [[f32; 3]],
     ) {
-        let (mut x, mut y, mut z) = ([0.0f32; PANEL], [0.0f32; PANEL], [0.0f32; PANEL]);
-        for (k, [dx, dy, dz]) in moved {
-            let column = &self.columns[k * self.skin.len() + first..][..out.len()];
-            for (i, phi) in column.iter().enumerate() {
-                x[i] += phi * dx;
-                y[i] += phi * dy;
-                z[i] += phi * dz;
+        let Confines { path, mask, offsets } = *confines;
+        let moved = cage.iter().zip(&self.cage).enumerate().filter(|(_, (c, c0))| c != c0);
+        steps.clear();
+        steps.extend(moved.map(|(column, (c, c0))| Step { column, by: [to_single(&(c - c0))] }));
+        self.coords.write(&Product { path, from: &self.skin, mask, offsets }, steps, rest);
+    }
+
+    /// Writes M for one to four `cages` one after the other into `rest` (`4 · #M by 3`), from all columns
+    /// that are not as bound.
+    pub(super) fn write_frames(
+        &self,
+        cages: &[&[Point]],
+        confines: &Confines,
+        steps: &mut Vec<Step>,
+        rest: &mut [[f32; 3]],
+    ) {
+        let count = self.skin.len();
+        if cages.len() < 2 || count * self.cage.len() < TOGETHER_FROM {
+            for (cage, rest) in cages.iter().zip(rest.chunks_exact_mut(count)) {
+                self.write_whole(cage, confines, steps, rest);
             }
+            return;
         }
-        if let Some(mask) = mask {
-            for (i, part) in mask[first..][..out.len()].iter().enumerate() {
-                x[i] *= part;
-                y[i] *= part;
-                z[i] *= part;
-            }
-        }
-        for (i, out) in out.iter_mut().enumerate() {
-            let [a, b, c] = self.skin[first + i];
-            *out = [a + x[i], b + y[i], c + z[i]];
-        }
-        if let Some(offsets) = offsets {
-            let pairs = out.iter_mut().zip(&offsets[first..]);
-            pairs.for_each(|(out, offset)| (0..3).for_each(|d| out[d] += offset[d]));
-        }
+        let Confines { path, mask, offsets } = *confines;
+        let cage_of = |frame: usize| cages[frame.min(cages.len() - 1)];
+        let by = |frame: usize, k: usize| to_single(&(cage_of(frame)[k] - self.cage[k]));
+        let moved = (0..self.cage.len()).filter(|&k| cages.iter().any(|cage| cage[k] != self.cage[k]));
+        let steps: Vec<Step<FRAMES>> =
+            moved.map(|column| Step { column, by: std::array::from_fn(|f| by(f, column)) }).collect();
+        let (ab, cd) = rest.split_at_mut(2 * count);
+        let ((a, b), (c, d)) = (ab.split_at_mut(count), cd.split_at_mut(count));
+        self.coords.write_frames(&Product { path, from: &self.skin, mask, offsets }, &steps, [a, b, c, d]);
     }
 }

@@ -43,39 +43,57 @@ impl SkeletonUpdater {
         &self.joint_coords
     }
 
-    /// Rest joints a = Ψ C of `cage` (C, `#C by 3`), Eq. (13), of whose movement joint j takes part by
-    /// `shares[j]`.
-    pub fn joints(&self, cage: &[Point], shares: &[f64]) -> Vec<Point> {
+    /// Writes rest joints a = Ψ C of `cage` (C, `#C by 3`), Eq. (13), of whose movement joint j takes part
+    /// by `shares[j]`.
+    pub fn joints_into(&self, cage: &[Point], shares: &[f64], joints: &mut Vec<Point>) {
         let bound = self.skeleton.joints();
-        let mut joints = self.joint_coords.times(cage);
+        self.joint_coords.times_into(cage, joints);
         for ((joint, bound), &share) in
             joints.iter_mut().zip(bound).zip(shares).filter(|(_, share)| **share != 1.0)
         {
             *joint = bound + (*joint - bound) * share;
         }
-        joints
     }
 
     /// Reads R_j and d_j from `transforms` measured at `rest_joints` (`#J by 3`).
-    pub fn motions(&self, transforms: &[Transform], rest_joints: &[Point]) -> Vec<JointMotion> {
+    pub fn motions_into(
+        &self,
+        transforms: &[Transform],
+        rest_joints: &[Point],
+        motions: &mut Vec<JointMotion>,
+    ) {
         let step = |j: usize| {
             let place = rest_joints[j];
             let carried = self.skeleton.parent(j).map_or(place, |parent| transforms[parent].apply(&place));
             transforms[j].apply(&place) - carried
         };
-        (0..transforms.len()).map(|j| JointMotion { linear: transforms[j].linear, step: step(j) }).collect()
+        motions.clear();
+        motions.extend(
+            (0..transforms.len()).map(|j| JointMotion { linear: transforms[j].linear, step: step(j) }),
+        );
     }
 
     /// Transforms T′ of `motions` on a skeleton whose joints rest at `joints`, Eq. (16–17):
     /// t′_j = T′_parent(a_j) + d_j − R_j a_j, and for a root t′_j = a_j + d_j − R_j a_j.
-    pub fn transforms(&self, motions: &[JointMotion], joints: &[Point]) -> Vec<Transform> {
-        let mut transforms = vec![Transform::identity(); motions.len()];
+    pub fn transforms_into(
+        &self,
+        motions: &[JointMotion],
+        joints: &[Point],
+        transforms: &mut Vec<Transform>,
+    ) {
+        transforms.resize(motions.len(), Transform::identity());
         for &j in self.skeleton.parents_first() {
             let place = joints[j];
             let carried = self.skeleton.parent(j).map_or(place, |parent| transforms[parent].apply(&place));
             let JointMotion { linear, step } = motions[j];
             transforms[j] = Transform { linear, translation: carried + step - linear * place };
         }
+    }
+
+    /// The same, fresh.
+    pub fn transforms(&self, motions: &[JointMotion], joints: &[Point]) -> Vec<Transform> {
+        let mut transforms = Vec::new();
+        self.transforms_into(motions, joints, &mut transforms);
         transforms
     }
 

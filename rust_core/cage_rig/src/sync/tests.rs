@@ -94,8 +94,10 @@ fn an_attenuated_fit_keeps_the_cage_near_the_skinned_one() {
     assert!(cage.attenuated() > 0);
     assert!(cage.condition() > 1e3);
     let pose = fixtures::lively_pose(&fixture, 0.5);
-    let joints = updater.joints(&fixture.cage, &whole(fixture.joints.len()));
-    let transforms = updater.transforms(&updater.motions(&pose, &joints), &joints);
+    let (mut joints, mut motions) = (Vec::new(), Vec::new());
+    updater.joints_into(&fixture.cage, &whole(fixture.joints.len()), &mut joints);
+    updater.motions_into(&pose, &joints, &mut motions);
+    let transforms = updater.transforms(&motions, &joints);
     let posed = cage.posed_cage(&fixture.cage, &transforms);
     assert!(fixtures::distance(&posed, &fixture.cage) < 5.0 * cage_size(&fixture));
     let rig = fixture.rig();

@@ -11,6 +11,8 @@ pub struct Work {
     pub reverse_solves: usize,
     /// Products with Φ over the whole skin.
     pub rest_passes: usize,
+    /// Those of them that read the columns of few cage vertices alone.
+    pub rest_column_passes: usize,
     /// Skinnings of the whole skin.
     pub skin_passes: usize,
     /// Evaluations of Eq. (8).
@@ -19,6 +21,8 @@ pub struct Work {
     pub center_integrations: usize,
     /// Products with Λ over the whole skin.
     pub center_passes: usize,
+    /// Those of them that read the columns of few cage vertices alone.
+    pub center_column_passes: usize,
 }
 
 /// Which of the large arrays are due.

@@ -1,0 +1,131 @@
+//! A rest skin that follows few cage vertices: what is kept so that only their columns are read.
+//!
+//! While a drag moves the same few vertices, M = M_b + Φ_K (C − C_b)_K: M_b is the skin of a cage C_b
+//! near by, made by a whole product, and Φ_K the columns of the vertices that differ from it, copied
+//! once. Nothing is added to what a drag itself has made, so nothing drifts however long it is.
+
+use super::rest_skin::{Confines, RestSkin};
+use crate::panels::{Panels, Step};
+use crate::points::{to_single, Point};
+
+/// A drag moves at most this part of the cage, and at most so many vertices.
+const PART: usize = 4;
+const MOST: usize = 16;
+
+/// How a pass was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pass {
+    /// From all columns that are not as bound.
+    Whole,
+    /// From the columns of few vertices.
+    Columns,
+}
+
+/// Φ_K, C − C_b and M_b.
+pub(super) struct Columns<'a> {
+    pub(super) panels: &'a Panels,
+    pub(super) steps: &'a [Step],
+    pub(super) from: &'a [[f32; 3]],
+}
+
+/// What a rest skin (or centers) keeps between passes.
+#[derive(Debug, Clone, Default)]
+pub struct Drag {
+    /// C of the last pass; empty before it.
+    last: Vec<Point>,
+    /// The last pass was whole, and wrote nothing but M.
+    plain: bool,
+    /// C_b, M_b and Φ_K; none before a drag.
+    near: Option<Near>,
+    /// Of the present pass.
+    pub(super) steps: Vec<Step>,
+}
+
+#[derive(Debug, Clone)]
+struct Near {
+    cage: Vec<Point>,
+    skin: Vec<[f32; 3]>,
+    /// K.
+    moved: Vec<usize>,
+    columns: Panels,
+}
+
+impl Drag {
+    /// Of a skin that rests in `cage` (C₀, `#C by 3`).
+    pub fn new(cage: &[Point]) -> Self {
+        Self { last: cage.to_vec(), plain: true, ..Self::default() }
+    }
+
+    /// What the kept skin was made under has changed: all is forgotten but the memory.
+    pub fn forget(&mut self) {
+        self.last.clear();
+        self.near = None;
+    }
+
+    /// The few columns that lead to `cage`; `written` is what the last pass wrote. None
+    /// where too much moves.
+    pub(super) fn to(
+        &mut self,
+        cage: &[Point],
+        skin: &RestSkin,
+        confines: &Confines,
+        written: &[[f32; 3]],
+    ) -> Option<Columns<'_>> {
+        let most = (cage.len() / PART).min(MOST);
+        if self.last.is_empty() || differing(cage, &self.last).nth(most).is_some() {
+            return None;
+        }
+        let near = match self.near.take() {
+            Some(near) if differing(cage, &near.cage).nth(most).is_none() => near.with(cage, skin),
+            kept => self.begin(kept, skin, confines, written).with(cage, skin),
+        };
+        let by = |&k: &usize| to_single(&(cage[k] - near.cage[k]));
+        self.steps.clear();
+        let moved = near.moved.iter().enumerate();
+        self.steps.extend(moved.map(|(column, k)| Step { column, by: [by(k)] }));
+        let near = self.near.insert(near);
+        Some(Columns { panels: &near.columns, steps: &self.steps, from: &near.skin })
+    }
+
+    /// A drag from where the last pass ended, in the memory of the one before it.
+    fn begin(
+        &mut self,
+        kept: Option<Near>,
+        skin: &RestSkin,
+        confines: &Confines,
+        written: &[[f32; 3]],
+    ) -> Near {
+        let mut place = kept.map_or_else(Vec::new, |near| near.skin);
+        place.clear();
+        place.extend_from_slice(written);
+        if !self.plain {
+            let bare = Confines { offsets: None, ..*confines };
+            skin.write_whole(&self.last, &bare, &mut self.steps, &mut place);
+        }
+        Near { cage: self.last.clone(), skin: place, moved: Vec::new(), columns: skin.coords().select(&[]) }
+    }
+
+    /// The pass to `cage` is done.
+    pub(super) fn done(&mut self, cage: &[Point], pass: Pass, confines: &Confines) {
+        self.plain = pass == Pass::Whole && confines.offsets.is_none();
+        self.last.clear();
+        self.last.extend_from_slice(cage);
+    }
+}
+
+impl Near {
+    /// With the columns of all that `cage` moves.
+    fn with(mut self, cage: &[Point], skin: &RestSkin) -> Self {
+        if differing(cage, &self.cage).any(|k| !self.moved.contains(&k)) {
+            self.moved.extend(differing(cage, &self.cage));
+            self.moved.sort_unstable();
+            self.moved.dedup();
+            self.columns = skin.coords().select(&self.moved);
+        }
+        self
+    }
+}
+
+fn differing<'a>(a: &'a [Point], b: &'a [Point]) -> impl Iterator<Item = usize> + 'a {
+    (0..a.len()).filter(|&k| a[k] != b[k])
+}

@@ -1,0 +1,80 @@
+//! What a frame makes of the three large arrays, when they are read and due.
+//!
+//! Everything that it works with stays from frame to frame: after the first one none allocates, but
+//! for the columns of a drag that begins, and what the thread pool keeps of its jobs.
+
+use super::bake_frames::Ahead;
+use super::cage_updater::FitScratch;
+use super::drag::{Drag, Pass};
+use super::skeleton_updater::JointMotion;
+use super::CoupledRig;
+use crate::points::Point;
+use crate::skinning::{Scratch, SkinningInput};
+
+/// What frames work with.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Buffers {
+    pub(super) drag: Drag,
+    /// Those last read, or those before the present ones.
+    pub(super) motions: Vec<JointMotion>,
+    pub(super) ahead: Ahead,
+    pub(super) bones: Scratch,
+    fit: FitScratch,
+    cage: Vec<Point>,
+}
+
+impl Buffers {
+    /// For a rig at rest in `cage` (C₀, `#C by 3`).
+    pub(super) fn new(cage: &[Point]) -> Self {
+        Self { drag: Drag::new(cage), ..Self::default() }
+    }
+}
+
+impl CoupledRig {
+    /// Rest skin M, `#M by 3`.
+    pub fn rest_skin(&mut self) -> &[[f32; 3]] {
+        if self.stale.rest_skin {
+            let Self { binding, rest_cage, ground, buffers, rest_skin, .. } = self;
+            let pass =
+                binding.rest_skin.write(rest_cage, &ground.confines(binding), &mut buffers.drag, rest_skin);
+            self.work.rest_passes += 1;
+            self.work.rest_column_passes += usize::from(pass == Pass::Columns);
+            self.stale.rest_skin = false;
+        }
+        &self.rest_skin
+    }
+
+    /// Posed skin M′, `#M by 3`.
+    pub fn posed_skin(&mut self) -> &[[f32; 3]] {
+        self.rest_skin();
+        if self.stale.posed_skin {
+            let needed = self.centers.as_mut().filter(|_| self.method.centers);
+            let centers = needed.map_or(&[][..], |centers| {
+                let pass = centers.update(&self.rest_cage, &self.ground.confines(&self.binding));
+                self.work.center_passes += usize::from(pass.is_some());
+                self.work.center_column_passes += usize::from(pass == Some(Pass::Columns));
+                centers.centers()
+            });
+            let (path, weights) = (self.binding.path, &self.binding.frame_weights);
+            let (transforms, rest_skin) = (&self.transforms, &self.rest_skin);
+            let input = SkinningInput { path, transforms, weights, rest_skin, centers };
+            (self.method.pose)(&input, &mut self.buffers.bones, &mut self.posed_skin);
+            self.work.skin_passes += 1;
+            self.stale.posed_skin = false;
+        }
+        &self.posed_skin
+    }
+
+    /// Posed cage C′, `#C by 3`.
+    pub fn posed_cage(&mut self) -> &[Point] {
+        if self.stale.posed_cage {
+            let Buffers { fit, cage, .. } = &mut self.buffers;
+            self.ground.cage_into(&self.rest_cage, cage);
+            let updater = &self.binding.cage_updater;
+            updater.posed_cage_into(cage, &self.transforms, fit, &mut self.posed_cage);
+            self.work.cage_fits += 1;
+            self.stale.posed_cage = false;
+        }
+        &self.posed_cage
+    }
+}
