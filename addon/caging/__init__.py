@@ -128,7 +128,7 @@ def finish(
     made = job.result()
     obj = result.write(context, cage, made, found, options, nodes)
     if tell is not None:
-        tell(result.summary(obj, made, [*found.notes, *character.left_out(found)]))
+        tell(result.summary(obj, made, [*found.notes, *character.left_out(found, made.dropped)]))
     return obj
 
 

@@ -134,9 +134,9 @@ def _repairs(repairs: dict[str, object], scene: refusals.Scene) -> list[str]:
     return notes
 
 
-def left_out(character: Character) -> list[str]:
-    """A sentence on bones that the cage does not follow, or none."""
-    bones = character.course.left_out()
+def left_out(character: Character, dropped: list[int]) -> list[str]:
+    """A sentence on bones that the cage does not follow, or none; `dropped`: nodes that it left out."""
+    bones = character.course.left_out(dropped)
     if not bones or character.armature is None:
         return []
     named = ", ".join(f"'{name}'" for name in bones[:3]) + (f" and {len(bones) - 3} more" if len(bones) > 3 else "")

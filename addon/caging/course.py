@@ -130,10 +130,14 @@ class Course:
         bone, position = self.named(place)
         return self.find(OnBone(bone, float(np.float32(position)))) or place
 
-    def left_out(self) -> list[str]:
-        """Bones that no part of the skeleton follows."""
+    def left_out(self, dropped: list[int]) -> list[str]:
+        """Bones that no part of the skeleton follows, or no part of a cage that left these nodes out."""
         followed = {self.graph.bones[piece.edge] for piece in self._pieces}
-        return [name for name, (head, tail) in self.graph.ends.items() if head != tail and name not in followed]
+        return [
+            name
+            for name, (head, tail) in self.graph.ends.items()
+            if head != tail and (name not in followed or tail in dropped)
+        ]
 
     def mirrored(self, place: Place) -> Place | None:
         """The place on the other side of a symmetric skeleton; None on the middle, or where there is none."""

@@ -250,6 +250,12 @@ def test_nodes_are_edited_and_undone(character: RigObjects, caging: ModuleType) 
     assert len(editing.places) == count
 
 
+def test_bones_that_a_cage_leaves_out_are_named(character: RigObjects, caging: ModuleType) -> None:
+    found = caging.open_character(bpy.context, character.armature, character.skins, caging.Options())
+    assert found.course.left_out([]) == []
+    assert found.course.left_out([found.scene.graph.ends["upper"][1]]) == ["upper"]
+
+
 def test_undo_knows_how_nodes_were_placed(character: RigObjects, caging: ModuleType) -> None:
     at_joints, by_itself = caging.Options(placement="JOINTS"), caging.Options()
     found = caging.open_character(bpy.context, character.armature, character.skins, at_joints)
