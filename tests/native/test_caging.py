@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def tube(square_tube):
     """A closed bar of 30 rings and a straight skeleton in it."""
     skin, faces = square_tube([(i / 3, 0.6 + 0.1 * np.sin(abs(i - 15))) for i in range(31)])
@@ -13,8 +13,12 @@ def tube(square_tube):
     return skin, faces, nodes, np.array([[0, 1], [1, 2]])
 
 
-def edges_of(triangles):
-    return np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+@pytest.fixture(scope="module")
+def made(tube):
+    """The bar's cage as it comes without options, and what was told of its progress."""
+    stages = []
+    cage = core.generate_cage(*tube, progress=lambda stage, part: stages.append((stage, part)))
+    return *cage, stages
 
 
 @pytest.mark.parametrize("placement", ["automatic", "joints"])
@@ -49,9 +53,8 @@ def test_sections_come_without_a_cage(tube):
     assert np.ptp(middle["corners"][:, 0]) < 0.3
 
 
-def test_progress_is_told_and_can_cancel(tube):
-    stages = []
-    core.generate_cage(*tube, progress=lambda stage, part: stages.append((stage, part)))
+def test_progress_is_told_and_can_cancel(tube, made):
+    stages = made[-1]
     assert stages
     assert all(0 <= part <= 1 for _, part in stages)
     with pytest.raises(core.CagingError) as refused:
@@ -65,8 +68,8 @@ def test_progress_is_told_and_can_cancel(tube):
         core.generate_cage(*tube, progress=fails)
 
 
-def test_a_job_generates_the_same_cage_in_a_thread_of_its_own(tube):
-    vertices, faces, report = core.generate_cage(*tube)
+def test_a_job_generates_the_same_cage_in_a_thread_of_its_own(tube, made):
+    vertices, faces, report, _ = made
     job = core.CagingJob(*tube)
     found = job.result()
     assert job.done
@@ -122,8 +125,7 @@ def test_faults_name_their_place(tube):
 def test_an_inside_out_skin_is_turned(tube):
     skin, (corners, sizes), nodes, edges = tube
     turned = corners.reshape(-1, 4)[:, ::-1].ravel()
-    _, _, report = core.generate_cage(skin, (turned, sizes), nodes, edges)
-    assert report["repairs"]["inside_out"]
+    assert core.CageGenerator(skin, (turned, sizes), nodes, edges).repairs["inside_out"]
 
 
 def test_a_generator_tells_the_skeleton_that_it_uses(tube):

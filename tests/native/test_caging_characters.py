@@ -60,7 +60,7 @@ def test_a_character_is_caged(name, placement):
 
 
 def test_sections_of_a_character_are_distinct_and_mirrored():
-    skin, faces, nodes, edges = load("human_24k_52b")
+    skin, faces, nodes, edges = load("human_2k_53b")
     sections = core.cage_sections(skin, faces, nodes, edges)
     for section in sections:
         corners = section["corners"]

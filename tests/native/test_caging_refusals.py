@@ -1,4 +1,7 @@
-"""A hundred broken inputs: each ends in an error that says what is wrong, or in a valid cage."""
+"""A hundred broken inputs: each ends in an error that says what is wrong, or in a valid cage.
+
+Most of those that can be caged stop where the cage begins to grow, free of crossings.
+"""
 
 import cage_rig_core as core
 import numpy as np
@@ -16,6 +19,7 @@ KINDS = [
     "empty",
     "wrong index",
 ]
+WHOLE = 2  # of each kind grow to the end
 MUST_FAIL = {"open", "not finite", "skeleton outside", "empty", "wrong index"}
 
 
@@ -60,9 +64,16 @@ def broken(kind, seed, square_tube):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_broken_input_is_refused_by_name_or_caged(kind, seed, square_tube):
     given = broken(kind, seed, square_tube)
+
+    def goes_on(stage, part):
+        return seed < WHOLE or stage != "growing the cage"
+
     try:
-        vertices, triangles, report = core.generate_cage(*given, options={"triangles": True})
+        vertices, triangles, report = core.generate_cage(*given, options={"triangles": True}, progress=goes_on)
     except core.CageRigError as refused:
+        if getattr(refused, "cancelled", False):
+            assert kind not in MUST_FAIL
+            return
         assert len(str(refused).split()) >= 4
         assert kind not in ("flipped", "doubled"), "that can be repaired"
         return
