@@ -5,7 +5,7 @@
 //! (level set diagrams after Lazarus and Verroust, 1999: a Reeb graph, which has a loop for each
 //! handle and a leaf for each limb). Straight runs are thinned out. `n log n` in the triangles.
 
-use super::obstacle::{proxy, Mesh};
+use super::obstacle::{Mesh, Obstacles};
 use super::skin::Skin;
 use crate::error::CagingError;
 use crate::mesh::Polygons;
@@ -32,7 +32,7 @@ pub struct ExtractedSkeleton {
 /// The curve skeleton of a closed skin (`vertices` `#V by 3`).
 pub fn extract_skeleton(vertices: &[Point], faces: &Polygons) -> Result<ExtractedSkeleton, CagingError> {
     let skin = Skin::new(vertices, faces)?;
-    let (Mesh { points, triangles }, _) = proxy(&skin);
+    let Mesh { points, triangles } = Obstacles::of(&skin).growth.mesh;
     let around = neighbours(points.len(), &triangles);
     let distance = surface_distance(&points, &around);
     let rings = rings(&points, &around, &distance);

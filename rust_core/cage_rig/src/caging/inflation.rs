@@ -8,6 +8,7 @@
 use super::contacts::{contacts, narrower, Body, Contact, Points};
 use super::contraction::Start;
 use super::energy::{energy, newton_step, Shape, Weights};
+use super::obstacle::StandIn;
 use super::tubes::Scaffold;
 use crate::geometry::collision::free_part;
 use crate::points::Point;
@@ -167,20 +168,22 @@ impl<'a> Inflation<'a> {
         Halt { vertex: own.unwrap_or(0) as usize }
     }
 
-    /// Tightens the cage around a resting obstacle, to a gap of `least`.
+    /// Tightens the cage around a resting obstacle, to a gap of the clearance and the obstacle's margin.
     pub(crate) fn tighten(
         &mut self,
-        (rest, triangles): (&[Point], &[[u32; 3]]),
+        obstacle: &StandIn,
         options: &InflationOptions,
         progress: &Part,
     ) -> Result<(), Cancelled> {
-        let body = Body::new(rest, triangles);
+        let rest = &obstacle.mesh.points;
+        let body = Body::new(rest, &obstacle.mesh.triangles);
+        let clearance = options.clearance + obstacle.margin;
         let mut reach = options.reach;
         let (mut stiffness, mut limit) = (0.3, STEP);
         for round in 0..options.rounds {
             progress.reach(round as f64 / options.rounds as f64)?;
             self.body.tree.refit(&self.cage);
-            let reached = reach + options.clearance + 2.0 * limit;
+            let reached = reach + clearance + 2.0 * limit;
             let mut around = Surroundings::of(&self.body, &body, &self.cage, rest, reached);
             let weights = Weights {
                 shape: stiffness,
@@ -188,7 +191,7 @@ impl<'a> Inflation<'a> {
                 volume: options.tightness,
                 quality: 1e-4,
                 reach,
-                least: options.clearance.min(0.5 * around.narrowest()),
+                least: clearance.min(0.5 * around.narrowest()),
             };
             let here = self.cage.clone();
             let moved = self.relax(&mut around, rest, &here, &weights, (2, limit));

@@ -38,7 +38,7 @@ use crate::progress::{Cancelled, Part};
 use contraction::Start;
 use control_nodes::{control_nodes, ControlNode};
 use inflation::Inflation;
-use obstacle::Mesh;
+use obstacle::{Mesh, Obstacles};
 use rings::STARTS;
 use sections::{Section, Traced};
 use skeleton::{curve_skeleton, CurveSkeleton};
@@ -92,7 +92,7 @@ pub struct Generator {
     options: CagingOptions,
     graph: (Vec<Point>, Vec<[i64; 2]>),
     traced: Traced,
-    proxy: OnceLock<(Mesh, f64)>,
+    obstacles: OnceLock<Obstacles>,
 }
 
 /// Control nodes, their sections, and for each corner its mirror image on a symmetric character.
@@ -147,7 +147,7 @@ impl Generator {
         let skin = Skin::new(vertices, faces)?;
         let skeleton = curve_skeleton(&skin, nodes, edges, options.detail, &[])?;
         let graph = (nodes.to_vec(), edges.to_vec());
-        Ok(Self { skin, skeleton, options, graph, traced: Traced::default(), proxy: OnceLock::new() })
+        Ok(Self { skin, skeleton, options, graph, traced: Traced::default(), obstacles: OnceLock::new() })
     }
 
     /// Control nodes and their cross sections; `bending`: the user's nodes, near the skeleton.
@@ -246,14 +246,14 @@ impl Generator {
         let (nodes, sections, mirror) = self.cross_sections(skeleton, bending, &tracing)?;
         clock.lap("sections");
         starting.begin("a start inside the skin")?;
-        let (proxy, margin) = self.proxy.get_or_init(|| obstacle::proxy(&self.skin));
+        let Obstacles { growth, tightening: fine } = self.obstacles.get_or_init(|| Obstacles::of(&self.skin));
         clock.lap("obstacle");
-        let (scaffold, start) = self.start(skeleton, (&nodes, &sections), proxy, &starting)?;
+        let (scaffold, start) = self.start(skeleton, (&nodes, &sections), &growth.mesh, &starting)?;
         clock.lap("contraction");
         growing.begin("growing the cage")?;
         let mut inflation = Inflation::new(&scaffold, mirror.as_deref(), start.cage.clone());
         let options = &self.options.inflation;
-        let grown = inflation.grow(start, options, options.clearance + margin, &growing)?;
+        let grown = inflation.grow(start, options, options.clearance + growth.margin, &growing)?;
         if let Err(halt) = grown {
             let node = nodes[scaffold.owner[halt.vertex]].node;
             let place = self.skin.space.leave(&inflation.cage[halt.vertex]);
@@ -261,7 +261,7 @@ impl Generator {
         }
         clock.lap("growth");
         tightening.begin("tightening the cage")?;
-        inflation.tighten((&self.skin.points, &self.skin.triangles), options, &tightening)?;
+        inflation.tighten(fine, options, &tightening)?;
         clock.lap("tightening");
         checking.begin("checking the cage")?;
         let vertices: Vec<Point> = inflation.cage.iter().map(|p| self.skin.space.leave(p)).collect();
@@ -285,7 +285,7 @@ impl Generator {
         &self,
         skeleton: &CurveSkeleton,
         (nodes, sections): (&[ControlNode], &[Section]),
-        proxy: &Mesh,
+        obstacle: &Mesh,
         part: &Part,
     ) -> Result<(Scaffold, Start), Failure> {
         let mut fault = Failure::Other(CagingError::TooFewSections { sections: nodes.len() });
@@ -300,7 +300,7 @@ impl Generator {
                     continue;
                 }
             };
-            match contraction::start(&joined, sections, proxy) {
+            match contraction::start(&joined, sections, obstacle) {
                 Ok(start) => return Ok((joined, start)),
                 Err(vertex) => {
                     let at = joined.owner[vertex];

@@ -1,7 +1,8 @@
-//! The stand-in that the cage grows around: the skin with a manageable number of triangles.
+//! Stand-ins for the skin with a manageable number of triangles.
 //!
-//! A fine skin is decimated, and the cage keeps a margin that covers what sticks out of the stand-in;
-//! a coarse one is subdivided, which leaves its surface as it is, so that it bends with the axis.
+//! The cage grows around one and is tightened around a finer one. A fine skin is decimated, and the
+//! cage keeps a margin that covers what sticks out of the stand-in; a coarse one is subdivided, which
+//! leaves its surface as it is, so that it bends with the axis.
 
 use super::skin::Skin;
 use crate::geometry::bvh::Bvh;
@@ -14,6 +15,9 @@ use std::collections::HashMap;
 const MANY: usize = 9000;
 const FEW: usize = 2000;
 
+/// Triangles that tightening is quick with.
+const FINE: usize = 25_000;
+
 /// Vertices and triangles, unit space.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Mesh {
@@ -21,26 +25,64 @@ pub(crate) struct Mesh {
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
-/// The stand-in, and how far the skin sticks out of it.
-pub(crate) fn proxy(skin: &Skin) -> (Mesh, f64) {
-    if skin.triangles.len() > MANY {
-        let (points, triangles) = decimate(&skin.points, &skin.triangles, MANY * 2 / 3);
-        let tree = Bvh::new(&points, &triangles);
-        let out = |p: &Point| match tree.winding(&points, p) {
-            0 => tree.nearest(&points, p).map_or(0.0, |n| n.distance),
-            _ => 0.0,
-        };
-        let margin = skin.points.par_iter().map(out).reduce(|| 0.0, f64::max);
-        return (Mesh { points, triangles }, margin);
+/// A mesh instead of the skin, and how far the skin sticks out of it.
+#[derive(Debug, Clone)]
+pub(crate) struct StandIn {
+    pub(crate) mesh: Mesh,
+    pub(crate) margin: f64,
+}
+
+/// What a cage is made around.
+#[derive(Debug)]
+pub(crate) struct Obstacles {
+    /// Where it grows.
+    pub(crate) growth: StandIn,
+    /// Where it is tightened.
+    pub(crate) tightening: StandIn,
+}
+
+impl Obstacles {
+    pub(crate) fn of(skin: &Skin) -> Self {
+        let whole = Mesh { points: skin.points.clone(), triangles: skin.triangles.clone() };
+        let fine = if whole.triangles.len() > FINE * 5 / 4 { whole.decimated(FINE) } else { whole };
+        let mut coarse =
+            if fine.triangles.len() > MANY { fine.decimated(MANY * 2 / 3) } else { fine.clone() };
+        while coarse.triangles.len() < FEW {
+            coarse.subdivide();
+        }
+        let decimated = |mesh: &Mesh, of: usize| mesh.triangles.len() < of;
+        let mut margins = [0.0; 2];
+        if decimated(&fine, skin.triangles.len()) {
+            margins[1] = fine.sticks_out(&skin.points);
+        }
+        if decimated(&coarse, fine.triangles.len()) {
+            // Also of the finer stand-in: tightening begins where growth ended.
+            margins[0] = coarse.sticks_out(&skin.points).max(coarse.sticks_out(&fine.points));
+        }
+        let [growth, tightening] = margins;
+        Self {
+            growth: StandIn { mesh: coarse, margin: growth },
+            tightening: StandIn { mesh: fine, margin: tightening },
+        }
     }
-    let mut mesh = Mesh { points: skin.points.clone(), triangles: skin.triangles.clone() };
-    while mesh.triangles.len() < FEW {
-        mesh.subdivide();
-    }
-    (mesh, 0.0)
 }
 
 impl Mesh {
+    fn decimated(&self, triangles: usize) -> Self {
+        let (points, triangles) = decimate(&self.points, &self.triangles, triangles);
+        Self { points, triangles }
+    }
+
+    /// How far any of `points` is outside.
+    fn sticks_out(&self, points: &[Point]) -> f64 {
+        let tree = Bvh::new(&self.points, &self.triangles);
+        let out = |p: &Point| match tree.winding(&self.points, p) {
+            0 => tree.nearest(&self.points, p).map_or(0.0, |n| n.distance),
+            _ => 0.0,
+        };
+        points.par_iter().map(out).reduce(|| 0.0, f64::max)
+    }
+
     /// Cuts every triangle into four at the middles of its sides.
     fn subdivide(&mut self) {
         let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
