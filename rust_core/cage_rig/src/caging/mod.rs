@@ -15,6 +15,7 @@ mod extraction;
 pub(crate) mod field;
 mod inflation;
 mod obstacle;
+mod pruning;
 mod report;
 mod rings;
 mod sections;

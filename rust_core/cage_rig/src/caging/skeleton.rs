@@ -2,10 +2,9 @@
 //!
 //! [CLM*19] §3 takes a curve skeleton as given; here any graph of nodes and edges is made into one.
 //! Nodes outside the skin are clipped toward their inside end and recentred (uphill in the distance
-//! to the skin); what stays outside is dropped. Leaves that don't stick out of the part they start
-//! from, as the bones of a face, are pruned, and branching nodes closer than their radius merged.
-//! Linear in the nodes but for pruning, which looks at pairs of leaves.
+//! to the skin); what stays outside is dropped, and the rest pruned. Linear in the nodes but for that.
 
+use super::pruning::{drop_crown, merge, prune};
 use super::skin::Skin;
 use crate::error::CagingError;
 use crate::points::{first_unusable, Point};
@@ -110,11 +109,12 @@ impl CurveSkeleton {
 }
 
 /// The graph while it is being worked on.
-struct Graph {
-    points: Vec<Point>,
-    node: Vec<usize>,
-    edges: Vec<(usize, usize)>,
-    dropped: Vec<usize>,
+pub(super) struct Graph {
+    pub(super) points: Vec<Point>,
+    /// The input's node of each.
+    pub(super) node: Vec<usize>,
+    pub(super) edges: Vec<(usize, usize)>,
+    pub(super) dropped: Vec<usize>,
 }
 
 /// Cleans the graph of `nodes` (`#N by 3`, the user's space) and `edges` and cuts it into arcs. Leaves
@@ -135,7 +135,10 @@ pub(crate) fn curve_skeleton(
         if skeleton.arcs.is_empty() {
             return Err(CagingError::SkeletonOutside);
         }
-        if !prune(skin, &mut graph, &skeleton, (detail, without)) && !merge(&mut graph, &skeleton) {
+        let changed = prune(skin, &mut graph, &skeleton, (detail, without))
+            || drop_crown(skin, &mut graph, &skeleton)
+            || merge(&mut graph, &skeleton);
+        if !changed {
             return Ok(skeleton);
         }
     }
@@ -170,7 +173,7 @@ fn read(skin: &Skin, nodes: &[Point], edges: &[[i64; 2]]) -> Result<Graph, Cagin
     Ok(graph)
 }
 
-fn join(edges: &mut Vec<(usize, usize)>, a: usize, b: usize) {
+pub(super) fn join(edges: &mut Vec<(usize, usize)>, a: usize, b: usize) {
     let edge = (a.min(b), a.max(b));
     if a != b && !edges.contains(&edge) {
         edges.push(edge);
@@ -344,83 +347,4 @@ fn arc(skin: &Skin, graph: &Graph, ends: [usize; 2], walk: &[usize]) -> Arc {
     }
     let radii = path.par_iter().map(|p| skin.depth(p).max(MARGIN)).collect();
     Arc { ends, path, along, radii, nodes }
-}
-
-/// Removes one leaf arc that does not stick out. True when there was one.
-fn prune(
-    skin: &Skin,
-    graph: &mut Graph,
-    skeleton: &CurveSkeleton,
-    (detail, without): (f64, &[usize]),
-) -> bool {
-    let mut leaves: Vec<(usize, usize, usize)> = Vec::new();
-    for (k, arc) in skeleton.arcs.iter().enumerate() {
-        for side in 0..2 {
-            let (tip, base) = (arc.ends[side], arc.ends[1 - side]);
-            if skeleton.junctions[tip].degree == 1 && skeleton.junctions[base].degree > 2 {
-                leaves.push((k, tip, base));
-            }
-        }
-    }
-    let reach =
-        |tip: usize, base: usize| (skeleton.junctions[tip].point - skeleton.junctions[base].point).norm();
-    leaves.sort_by(|a, b| reach(a.1, a.2).total_cmp(&reach(b.1, b.2)).then(a.0.cmp(&b.0)));
-    let hidden = |&(k, tip, base): &(usize, usize, usize)| {
-        let (p, b) = (skeleton.junctions[tip].point, &skeleton.junctions[base]);
-        let mut radii = skeleton.arcs[k].radii.clone();
-        radii.sort_by(f64::total_cmp);
-        let thin = radii[radii.len() / 2] < detail || without.contains(&skeleton.junctions[tip].node);
-        let short = thin || reach(tip, base) < 1.4 * b.radius || skeleton.arcs[k].length() < 1e-2;
-        let sibling = |&(other, far, at): &(usize, usize, usize)| {
-            let q = skeleton.junctions[far].point;
-            let ahead =
-                (p - b.point).dot(&(q - b.point)) > -0.2 * (p - b.point).norm() * (q - b.point).norm();
-            other != k && at == base && reach(far, at) >= reach(tip, base) && ahead && skin.sees(&p, &q, 12)
-        };
-        short || leaves.iter().any(sibling)
-    };
-    let Some(&(k, ..)) = leaves.iter().find(|leaf| hidden(leaf)) else { return false };
-    remove(graph, &skeleton.arcs[k], |junction| skeleton.junctions[junction].degree == 1);
-    true
-}
-
-fn remove(graph: &mut Graph, arc: &Arc, is_leaf: impl Fn(usize) -> bool) {
-    let on: Vec<usize> = arc.nodes.iter().flatten().copied().collect();
-    let index = |node: usize| graph.node.iter().position(|n| *n == node);
-    let steps: Vec<(usize, usize)> = on
-        .windows(2)
-        .filter_map(|w| Some((index(w[0])?, index(w[1])?)))
-        .map(|(a, b)| (a.min(b), a.max(b)))
-        .collect();
-    graph.edges.retain(|e| !steps.contains(e));
-    let inner = on.iter().enumerate().filter(|(i, _)| match *i {
-        0 => is_leaf(arc.ends[0]),
-        i if i + 1 == on.len() => is_leaf(arc.ends[1]),
-        _ => true,
-    });
-    let inner: Vec<usize> = inner.map(|(_, n)| *n).collect();
-    graph.dropped.extend(inner);
-}
-
-/// Merges two branching nodes closer than their radius. True when there were two.
-fn merge(graph: &mut Graph, skeleton: &CurveSkeleton) -> bool {
-    let close = skeleton.arcs.iter().find(|arc| {
-        let [a, b] = arc.ends.map(|e| &skeleton.junctions[e]);
-        arc.ends[0] != arc.ends[1]
-            && a.degree > 2
-            && b.degree > 2
-            && arc.length() < 0.9 * a.radius.max(b.radius)
-    });
-    let Some(arc) = close else { return false };
-    let [a, b] = arc.ends.map(|e| skeleton.junctions[e].node);
-    let index = |graph: &Graph, node: usize| graph.node.iter().position(|n| *n == node);
-    remove(graph, arc, |_| false);
-    let (Some(a), Some(b)) = (index(graph, a), index(graph, b)) else { return false };
-    graph.points[a] = (graph.points[a] + graph.points[b]) * 0.5;
-    let edges = std::mem::take(&mut graph.edges);
-    for (p, q) in edges {
-        let to = |i: usize| if i == b { a } else { i };
-        join(&mut graph.edges, to(p), to(q));
-    }
-    true
 }
