@@ -145,10 +145,10 @@ def choose_and_cancel() -> Iterator[float | None]:
     bpy.context.view_layer.objects.active = cage
     shape = shown(skin)
     choose("COR")
-    yield 2.0
-    driver.screenshot("5_method_on_its_way")
+    yield 0.1  # long enough for the panel to be drawn, not for the method to be ready
     driver.check("the panel has progress", choosing.progress(cage) is not None, choosing.progress(cage))
     driver.check("the skin is as before", np.array_equal(shown(skin), shape))
+    driver.screenshot("5_method_on_its_way")
     area, region = driver.view()
     with bpy.context.temp_override(window=driver.window(), area=area, region=region):
         bpy.ops.cage_rig.cancel_method()
