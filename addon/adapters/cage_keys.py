@@ -176,7 +176,8 @@ def _new_shape(cage: bpy.types.Object, name: str, *, value: float = 0.0) -> bpy.
     if cage.data.shape_keys is None:
         cage.shape_key_add(name="Basis", from_mix=False)
     block = cage.shape_key_add(name=name, from_mix=False)
-    block.relative_key = cage.data.shape_keys.key_blocks[0]
+    base = block.relative_key = cage.data.shape_keys.key_blocks[0]
+    shape_keys.write_key(block, shape_keys.read_key(base, len(cage.data.vertices)))  # the mesh may be another
     block.value = value
     return block
 

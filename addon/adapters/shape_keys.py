@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from .positions import Points, write_base
+from .positions import Points, read_base, write_base
 from .vertex_groups import read_group
 
 SMALLEST_VALUE = 1e-3
@@ -64,9 +64,7 @@ def move(obj: bpy.types.Object, delta: Points) -> None:
     count = len(mesh.vertices)
     keys = mesh.shape_keys
     if keys is None:
-        points = np.empty((count, 3), np.float32)
-        mesh.vertices.foreach_get("co", points.ravel())
-        write_base(mesh, points + delta)
+        write_base(mesh, read_base(mesh) + delta)
         return
     if obj.active_shape_key_index > 0:
         block = obj.active_shape_key
@@ -74,6 +72,7 @@ def move(obj: bpy.types.Object, delta: Points) -> None:
     else:
         for block in keys.key_blocks:
             write_key(block, read_key(block, count) + delta)
+        write_base(mesh, read_key(keys.key_blocks[0], count))  # what a rebind reads, and Blender makes new keys of
     mesh.update()
     mesh.update_tag()
 

@@ -204,6 +204,17 @@ def test_an_edit_between_keys_waits_to_be_keyed(three: Rig) -> None:
     assert_plays(three, [KEYS[0], KEYS[1], (15.0, np.float32([1.0, 1.3, 1.3])), KEYS[2]])
 
 
+def test_an_unkeyed_edit_begins_at_the_basis_also_where_the_mesh_is_another(three: Rig) -> None:
+    """A script that writes the basis key leaves the mesh as it was, and Blender makes new keys of the mesh."""
+    basis = three.cage.data.shape_keys.reference_key
+    basis.points[0].co.z -= 0.07
+    three.cage.data.update()
+    update()
+    go(15)
+    wanted = reshape(three, np.float32([1.0, 1.3, 1.3]))
+    assert np.abs(cage(three) - wanted).max() < 1e-5
+
+
 def test_an_unkeyed_edit_can_be_discarded(three: Rig) -> None:
     go(15)
     reshape(three, np.float32([1.0, 1.3, 1.3]))

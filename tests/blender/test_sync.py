@@ -127,6 +127,18 @@ def test_edit_goes_to_the_active_shape_key(bar: Rig) -> None:
     assert np.abs(shown(bar.skin) - rest(bar.skin)).max() < 1e-6 * bar.size
 
 
+def test_edit_of_the_base_key_moves_the_mesh_too(bar: Rig) -> None:
+    """A rebind reads the mesh."""
+    fat_key(bar, value=0.0)
+    bar.cage.active_shape_key_index = 0
+    wanted = rest(bar.posed)
+    wanted[9] += (0.0, 0.1, 0.0)
+    set_mesh(bar.posed, wanted)
+    base = np.empty_like(wanted)
+    bar.cage.data.shape_keys.reference_key.points.foreach_get("co", base.ravel())
+    assert np.abs(base - wanted).max() < 1e-5 and np.array_equal(rest(bar.cage), base)
+
+
 @pytest.mark.parametrize("fault", ["value", "mute", "modifier", "influence"])
 def test_impossible_posed_edit_is_refused_and_taken_back(bar: Rig, fault: str) -> None:
     key = fat_key(bar, value=0.0 if fault == "value" else 1.0)
