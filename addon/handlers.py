@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When Blender calls us. Each handler is a door to `sync` and nothing more."""
+"""When Blender calls us. Each handler is a door to `sync` or `leftovers` and nothing more."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import atexit
 import bpy
 from bpy.app.handlers import persistent
 
-from . import sync
+from . import leftovers, sync
 
 
 @persistent
@@ -69,6 +69,11 @@ def load_post(*_: object) -> None:
     sync.restored()
 
 
+@persistent
+def save_pre(*_: object) -> None:
+    leftovers.drop()
+
+
 HANDLERS = (
     depsgraph_update_post,
     frame_change_post,
@@ -80,6 +85,7 @@ HANDLERS = (
     render_complete,
     render_cancel,
     load_post,
+    save_pre,
 )
 
 

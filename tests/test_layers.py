@@ -59,7 +59,8 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "keying": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "sync"}),
     "repair": ({"bpy"}, {"adapters", "lifecycle"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
-    "handlers": ({"bpy"}, {"sync"}),
+    "leftovers": ({"bpy"}, {"adapters", "registry", "sync"}),
+    "handlers": ({"bpy"}, {"leftovers", "sync"}),
     "operators": (
         {"bpy"},
         {
@@ -84,7 +85,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     ),
     "headless": (
         {"argparse", "bpy", "json", "mathutils", "numpy", "pathlib", "sys", "time", "zipfile"},
-        {"adapters", "bake", "binding", "headless", "registry", "session", "sync"},
+        {"adapters", "bake", "binding", "caging", "headless", "registry", "session", "sync"},
     ),
     "__init__": (set(), {"handlers", "headless", "operators", "props", "translations", "ui"}),
     "translations": ({"bpy"}, set()),

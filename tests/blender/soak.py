@@ -9,6 +9,7 @@ import random
 import resource
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -33,6 +34,7 @@ class Soak:
         self.chance = random.Random(seed)
         self.path = folder / "soak.blend"
         self.met: dict[str, int] = {}
+        self.memory: list[int] = []  # bytes of the process after every tenth of the events
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         bpy.context.preferences.edit.undo_steps = 12
         self.names: list[tuple[list[str], str, str]] = []
@@ -57,11 +59,11 @@ class Soak:
     def push(self) -> None:
         bpy.ops.ed.undo_push(message="soak")
 
-    def run(self, events: int) -> list[str]:
-        """Let so many events happen; returns what was found wrong."""
+    def run(self, events: int, tell: Callable[[str], object] = lambda _line: None) -> list[str]:
+        """Let so many events happen; returns what was found wrong. `tell` gets a line after every tenth of them."""
         faults: list[str] = []
         names = list(EVENTS)
-        memory = 0
+        begun = time.monotonic()
         for count in range(1, events + 1):
             name = self.chance.choice(names)
             self.met[name] = self.met.get(name, 0) + 1
@@ -69,9 +71,11 @@ class Soak:
             update()
             if count % EVERY == 0 or count == events:
                 faults += [f"after event {count} ({name}): {fault}" for fault in self.compare()]
-            if count == events * 2 // 5:
-                memory = resident()
-        grown = resident() - memory
+            if count % max(1, events // 10) == 0:
+                self.memory.append(resident())
+                minutes = (time.monotonic() - begun) / 60.0
+                tell(f"{count} events, {len(faults)} faults, {self.memory[-1] / 1e6:.0f} MB, {minutes:.1f} min")
+        grown = self.memory[-1] - self.memory[len(self.memory) * 2 // 5 - 1]
         if grown > GROWTH:
             faults.append(f"the process grew by {grown / 1e6:.0f} MB")
         return faults
@@ -225,10 +229,10 @@ def main() -> None:
     events, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1
     with tempfile.TemporaryDirectory() as folder:
         soak = Soak(seed, Path(folder))
-        faults = soak.run(events)
+        faults = soak.run(events, lambda line: print(line, flush=True))
     for fault in faults[:20]:
         print(fault)
-    print(f"{events} events, {len(faults)} faults, {resident() / 1e6:.0f} MB: {soak.met}")
+    print(f"{events} events, {len(faults)} faults: {soak.met}")
     sys.exit(bool(faults))
 
 
