@@ -23,9 +23,10 @@ from .course import OnBone
 from .editing import Editing, Source
 from .options import Options
 from .refusals import GenerateError
-from .result import nodes_of, options_of, refuse_cage
+from .result import SECTION, nodes_of, options_of, refuse_cage
 
 __all__ = [
+    "SECTION",
     "Cancelled",
     "Character",
     "Editing",
@@ -55,6 +56,7 @@ def generate_cage(
     nodes: list[OnBone] | None = None,
     cage: bpy.types.Object | None = None,
     tell: Callable[[str], object] | None = None,
+    watch: Callable[[Job], object] | None = None,
 ) -> bpy.types.Object:
     """Generate a cage around skins, from the bones of their armature that move them. Object Mode.
 
@@ -62,12 +64,12 @@ def generate_cage(
 
     `nodes`: bending nodes as (bone, position), 0 at the bone's head and 1 at its tail; else they are placed. `cage`: an
     object that gets the new mesh in place of its own, with the nodes that it remembers unless others are given. `tell`
-    gets a sentence on what was made.
+    gets a sentence on what was made, `watch` the job twice a second while it works.
     """
     if cage is not None:
         options = options or options_of(cage)
         nodes = nodes_of(cage) if nodes is None else nodes
-    return make(context, skins, armature, options or Options(), nodes, cage=cage, tell=tell)
+    return make(context, skins, armature, options or Options(), nodes, cage=cage, tell=tell, watch=watch)
 
 
 def make(
@@ -79,6 +81,7 @@ def make(
     *,
     cage: bpy.types.Object | None,
     tell: Callable[[str], object] | None,
+    watch: Callable[[Job], object] | None = None,
 ) -> bpy.types.Object:
     """As `generate_cage`, but nothing is taken from the cage."""
     if cage is not None:
@@ -88,7 +91,8 @@ def make(
     try:
         job = found.generator.start(editing.bending)
         while not job.wait(0.5):
-            pass
+            if watch is not None:
+                watch(job)
         return finish(context, job, found, options, editing.nodes, cage=cage, tell=tell)
     except Refusal as refusal:
         raise explain(refusal, found) from refusal

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: checks, bakes and regressions of files, without a window.
+"""The command line: checks, bakes, regressions and cages of files, without a window.
 
     blender --command cage_rig check walk.blend
     blender --command cage_rig bake walk.blend --to usd --frames 1-48 --out baked
     blender --command cage_rig compare walk.blend walk.golden.npz
+    blender --command cage_rig generate-cage hero.blend --out hero_caged.blend
 
 Where Blender is the bpy module: `python -m cage_rig …`, from the folder that the extension was installed into.
 """
@@ -17,7 +18,7 @@ from pathlib import Path
 
 import bpy
 
-from . import baking, check, compare, merge
+from . import baking, check, compare, generate, merge
 from .run import ANSWER_NO, FINE, REFUSED, Refusal, Voice
 
 NAME = "cage_rig"
@@ -32,12 +33,12 @@ def parser() -> argparse.ArgumentParser:
     """All arguments."""
     top = argparse.ArgumentParser(
         prog=f"blender --command {NAME}",
-        description="Check, bake and compare rigs of Cage Rig without a window.",
+        description="Check, bake and compare rigs of Cage Rig, and generate cages, without a window.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = top.add_subparsers(metavar="COMMAND", required=True)
-    for module in (check, baking, compare, merge):
+    for module in (check, baking, compare, merge, generate):
         one = commands.add_parser(
             module.NAME,
             help=module.HELP,

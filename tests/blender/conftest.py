@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
 
 import extension
 import pytest
@@ -31,3 +34,26 @@ def empty_file(installed: None, capfd: pytest.CaptureFixture[str]) -> Iterator[N
 def bar() -> Rig:
     """The bar, bound."""
     return bound_bar()
+
+
+Main = Callable[..., tuple[int, dict]]
+
+
+@pytest.fixture
+def headless() -> ModuleType:
+    import bl_ext.user_default.cage_rig.headless as headless
+
+    return headless
+
+
+@pytest.fixture
+def main(headless: ModuleType, tmp_path: Path) -> Main:
+    """Runs a command line; returns exit code and JSON."""
+
+    def call(*arguments: object) -> tuple[int, dict]:
+        answer = tmp_path / "answer.json"
+        answer.unlink(missing_ok=True)
+        code = headless.main([*map(str, arguments), "--quiet", "--json", str(answer)])
+        return code, json.loads(answer.read_text()) if answer.exists() else {}
+
+    return call

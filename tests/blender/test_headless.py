@@ -19,26 +19,6 @@ from test_sync import key_the_bar
 Main = Callable[..., tuple[int, dict]]
 
 
-@pytest.fixture
-def headless() -> ModuleType:
-    import bl_ext.user_default.cage_rig.headless as headless
-
-    return headless
-
-
-@pytest.fixture
-def main(headless: ModuleType, tmp_path: Path) -> Main:
-    """Runs a command line; returns exit code and JSON."""
-
-    def call(*arguments: object) -> tuple[int, dict]:
-        answer = tmp_path / "answer.json"
-        answer.unlink(missing_ok=True)
-        code = headless.main([*map(str, arguments), "--quiet", "--json", str(answer)])
-        return code, json.loads(answer.read_text()) if answer.exists() else {}
-
-    return call
-
-
 def save(path: Path) -> Path:
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
