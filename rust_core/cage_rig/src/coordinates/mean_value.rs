@@ -5,15 +5,19 @@
 //! weights are the components of m along the directions to the corners. One angle per edge, so
 //! `#points · (#edges + #faces)`. Defined inside, on and outside a closed mesh.
 //!
+//! Points are worked on one a lane (`lanes.rs`), pieces of the mesh one after the other (`patch.rs`).
+//!
 //! We differ from the paper where it is unstable: on the surface the distance decides (not an
 //! angle), a face seen edge-on has formulas without cancellation (`degenerate.rs`), and what
 //! rounding leaves of linear precision is corrected by the smallest change (`Correction`).
 
-use super::degenerate::Seen;
+use super::lanes::Weigh;
+use super::patch::{patches, Patch, Sight};
 use crate::cage::Cage;
 use crate::points::{bounding_diagonal, Matrix3, Point};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
+use crate::simd::Path;
 use rayon::prelude::*;
 
 /// Points nearer than this part of the size lie *on* a vertex, an edge or a face.
@@ -29,11 +33,8 @@ pub fn coordinates(cage: &Cage, points: &[Point], part: &Part) -> Result<Rows, C
     let mut rows = Rows::zeros(points.len(), width);
     let count = part.count(points.len());
     let chunks = rows.as_mut_slice().par_chunks_mut(CHUNK * width).zip(points.par_chunks(CHUNK));
-    chunks.try_for_each_init(Scratch::default, |scratch, (rows, points)| {
-        for (row, point) in rows.chunks_exact_mut(width).zip(points) {
-            surface.weights(point, scratch, row);
-            correction.apply(cage.vertices(), point, row);
-        }
+    chunks.try_for_each(|(rows, points)| {
+        surface.weigh(points, Some(&correction), rows, part)?;
         count.step(points.len())
     })?;
     Ok(rows)
@@ -41,174 +42,72 @@ pub fn coordinates(cage: &Cage, points: &[Point], part: &Part) -> Result<Rows, C
 
 /// A triangle mesh, open or closed, prepared for weights of many points.
 pub struct Surface<'a> {
-    vertices: &'a [Point],
-    edges: Vec<[u32; 2]>,
-    faces: Vec<Face>,
-    touch: f64,
-}
-
-/// A triangle with area. Side k runs between the two other corners, along edge `edges[k]`
-/// (`signs[k]` is −1 when against it).
-struct Face {
-    corners: [usize; 3],
-    edges: [usize; 3],
-    signs: [f64; 3],
-    double_area: f64,
-}
-
-/// What is known of an edge from one point: u_a × u_b and its length, half the angle along it, the
-/// angle.
-#[derive(Clone, Copy)]
-struct Side {
-    cross: Point,
-    sine: f64,
-    half: Point,
-    angle: f64,
-}
-
-/// Room for one point's work, reused from point to point.
-#[derive(Default)]
-pub struct Scratch {
-    directions: Vec<Point>,
-    distances: Vec<f64>,
-    sides: Vec<Side>,
+    pub(super) vertices: &'a [Point],
+    pub(super) patches: Vec<Patch>,
+    pub(super) size: f64,
+    pub(super) touch: f64,
 }
 
 impl<'a> Surface<'a> {
     /// Prepares `vertices` (`#V by 3`) and `triangles`; triangles without area count for nothing.
     pub fn new(vertices: &'a [Point], triangles: &[[u32; 3]]) -> Self {
         let size = bounding_diagonal(vertices);
-        // Edges by their lower vertex, of which each has a few.
-        let mut known: Vec<Vec<(u32, usize)>> = vec![Vec::new(); vertices.len()];
-        let mut edges = Vec::with_capacity(triangles.len() * 3 / 2);
-        let mut faces = Vec::with_capacity(triangles.len());
-        for triangle in triangles {
-            let corners = triangle.map(|v| v as usize);
-            let [a, b, c] = corners.map(|v| vertices[v]);
-            let double_area = (b - a).cross(&(c - a)).norm();
-            if double_area <= TOUCH * TOUCH * size * size {
-                continue;
-            }
-            let mut face = Face { corners, edges: [0; 3], signs: [1.0; 3], double_area };
-            for k in 0..3 {
-                let (from, to) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-                let (low, high) = (from.min(to), from.max(to));
-                let around = &mut known[low as usize];
-                let found = around.iter().find(|(end, _)| *end == high);
-                face.edges[k] = found.map_or(edges.len(), |(_, edge)| *edge);
-                if face.edges[k] == edges.len() {
-                    around.push((high, edges.len()));
-                    edges.push([low, high]);
-                }
-                face.signs[k] = if from < to { 1.0 } else { -1.0 };
-            }
-            faces.push(face);
-        }
-        Self { vertices, edges, faces, touch: TOUCH * size }
+        let patches = patches(vertices, triangles, TOUCH * TOUCH * size * size);
+        Self { vertices, patches, size, touch: TOUCH * size }
     }
 
-    /// Writes the weights of `point` into `row` (one per vertex, sum 1; all 0 when the mesh has no
-    /// weight at all).
-    pub fn weights(&self, point: &Point, scratch: &mut Scratch, row: &mut [f64]) {
-        row.fill(0.0);
-        if self.at_vertex(point, scratch, row) || self.at_edge(scratch, row) {
-            return;
+    /// Writes the weights of `points` into `rows` (`#points by #V`): sums are 1, or all are 0 where the
+    /// mesh has no weight at all. Looks for a cancel at every piece of the mesh.
+    pub fn weights(&self, points: &[Point], rows: &mut [f64], part: &Part) -> Result<(), Cancelled> {
+        self.weigh(points, None, rows, part)
+    }
+
+    fn weigh(
+        &self,
+        points: &[Point],
+        correction: Option<&Correction>,
+        rows: &mut [f64],
+        part: &Part,
+    ) -> Result<(), Cancelled> {
+        let mut done = Ok(());
+        Path::default().run(Weigh { surface: self, points, correction, rows, part, done: &mut done });
+        done
+    }
+
+    /// What every face adds to the row of `point`, each seen closely; and whether one is touched.
+    pub(super) fn seen_closely(&self, point: &Point) -> (Vec<f64>, bool) {
+        let (mut row, mut touched) = (vec![0.0; self.vertices.len()], false);
+        for patch in &self.patches {
+            for face in &patch.faces {
+                match patch.sight(face, self.vertices, point, self.touch) {
+                    Sight::Weights(weights) => {
+                        let corners = face.corners.map(|v| patch.vertices[v as usize] as usize);
+                        corners.iter().zip(weights).for_each(|(v, weight)| row[*v] += weight);
+                    }
+                    Sight::Nothing => {}
+                    Sight::Touched => touched = true,
+                }
+            }
         }
-        for face in &self.faces {
-            if self.add_face(face, scratch, row) {
+        (row, touched)
+    }
+
+    /// The row of a point on a vertex, or else on an edge, or else on a face.
+    pub(super) fn place(&self, point: &Point, row: &mut [f64]) {
+        row.fill(0.0);
+        for level in 0..3 {
+            let place = |patch: &Patch| patch.place(level, self.vertices, point, self.touch, row);
+            if self.patches.iter().any(place) {
                 return;
             }
         }
-        let sum: f64 = row.iter().sum();
-        let scale = if sum == 0.0 { 0.0 } else { 1.0 / sum };
-        row.iter_mut().for_each(|w| *w *= scale);
-    }
-
-    /// Finds distances and directions. True when the point is a vertex: then the row is done.
-    fn at_vertex(&self, point: &Point, scratch: &mut Scratch, row: &mut [f64]) -> bool {
-        scratch.directions.clear();
-        scratch.distances.clear();
-        for (k, vertex) in self.vertices.iter().enumerate() {
-            let toward = vertex - point;
-            let distance = toward.norm();
-            if distance <= self.touch {
-                row[k] = 1.0;
-                return true;
-            }
-            scratch.distances.push(distance);
-            scratch.directions.push(toward / distance);
-        }
-        false
-    }
-
-    /// Finds what edges look like. True when the point is on an edge: then the row is done.
-    fn at_edge(&self, scratch: &mut Scratch, row: &mut [f64]) -> bool {
-        scratch.sides.clear();
-        for &[a, b] in &self.edges {
-            let (a, b) = (a as usize, b as usize);
-            let (from, to) = (scratch.directions[a], scratch.directions[b]);
-            // Not u_a × u_b: the difference is exact where the two are close.
-            let cosine = from.dot(&to);
-            let cross = if cosine > 0.5 { from.cross(&(to - from)) } else { from.cross(&to) };
-            let sine = cross.norm();
-            if cosine < 0.0 {
-                let (near, far) = (scratch.distances[a], scratch.distances[b]);
-                if sine * near * far <= self.touch * (near + far) {
-                    row[a] = far / (near + far);
-                    row[b] = near / (near + far);
-                    return true;
-                }
-            }
-            let angle = sine.atan2(cosine);
-            let ratio = if sine > 0.0 { angle / sine } else { 1.0 };
-            scratch.sides.push(Side { cross, sine, half: cross * (0.5 * ratio), angle });
-        }
-        false
-    }
-
-    /// Adds one face's weights. True when the point is on it: then the row is done.
-    fn add_face(&self, face: &Face, scratch: &Scratch, row: &mut [f64]) -> bool {
-        let sides = face.edges.map(|e| scratch.sides[e]);
-        let distances = face.corners.map(|v| scratch.distances[v]);
-        let crosses: [Point; 3] = std::array::from_fn(|k| sides[k].cross * face.signs[k]);
-        let sines = sides.map(|s| s.sine);
-        // The determinant is most exact from the shortest side.
-        let short = (0..3).min_by(|&i, &k| sines[i].total_cmp(&sines[k])).unwrap_or(0);
-        let determinant = scratch.directions[face.corners[short]].dot(&crosses[short]);
-        let height = determinant.abs() * distances[0] * distances[1] * distances[2] / face.double_area;
-        // Cosines of the angles between the sides at each corner, up to a positive factor.
-        let turns: [f64; 3] = std::array::from_fn(|k| -crosses[(k + 1) % 3].dot(&crosses[(k + 2) % 3]));
-        if height <= self.touch {
-            if turns.iter().any(|&turn| turn > 0.0) {
-                return false; // in the face's plane, outside it: no weight
-            }
-            // On the face: barycentric coordinates, from the areas opposite the corners.
-            row.fill(0.0);
-            let areas: [f64; 3] =
-                std::array::from_fn(|k| crosses[k].norm() * distances[(k + 1) % 3] * distances[(k + 2) % 3]);
-            (0..3).for_each(|k| row[face.corners[k]] = areas[k] / areas.iter().sum::<f64>());
-            return true;
-        }
-        let seen = Seen {
-            directions: face.corners.map(|v| scratch.directions[v]),
-            angles: sides.map(|s| s.angle),
-            sines,
-            turns,
-            determinant,
-        };
-        let components = seen.degenerate_components(short).unwrap_or_else(|| {
-            let mean: Point = (0..3).map(|k| sides[k].half * face.signs[k]).sum();
-            crosses.map(|cross| mean.dot(&cross) / determinant)
-        });
-        (0..3).for_each(|k| row[face.corners[k]] += components[k] / distances[k]);
-        false
     }
 }
 
 /// The smallest change of a row that makes it reproduce its point.
-struct Correction {
-    middle: Point,
-    spread_inverse: Option<Matrix3>,
+pub(super) struct Correction {
+    pub(super) middle: Point,
+    pub(super) spread_inverse: Option<Matrix3>,
     tolerance: f64,
 }
 
@@ -219,7 +118,7 @@ impl Correction {
         Self { middle, spread_inverse: spread.try_inverse(), tolerance: 1e-14 * bounding_diagonal(vertices) }
     }
 
-    fn apply(&self, vertices: &[Point], point: &Point, row: &mut [f64]) {
+    pub(super) fn apply(&self, vertices: &[Point], point: &Point, row: &mut [f64]) {
         let miss: Point = row.iter().zip(vertices).map(|(w, c)| *w * (c - point)).sum();
         if let (true, Some(inverse)) = (miss.norm() > self.tolerance, self.spread_inverse) {
             let slope = inverse * miss;

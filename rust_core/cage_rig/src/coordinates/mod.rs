@@ -4,9 +4,11 @@
 //! reproduce the point they belong to (linear precision): `Φ C₀ = M₀`.
 
 mod degenerate;
+mod lanes;
 pub mod mean_value;
 #[cfg(test)]
 mod naive;
+mod patch;
 #[cfg(test)]
 mod tests;
 

@@ -1,12 +1,15 @@
 //! What every kind of coordinates must do, by being in the table.
 
+use super::lanes::Weigh;
+use super::mean_value::Surface;
 use super::naive::ORACLES;
 use super::{kind, CoordinateKind, KINDS};
 use crate::cage::Cage;
 use crate::fixtures::{self, arm, random::Random};
 use crate::points::{bounding_diagonal, Point};
-use crate::progress::unwatched;
+use crate::progress::{unwatched, Cancelled, Progress};
 use crate::rows::Rows;
+use crate::simd::Path;
 
 fn compute(kind: &CoordinateKind, cage: &Cage, points: &[Point]) -> Rows {
     unwatched(|part| (kind.compute)(cage, points, part))
@@ -108,6 +111,53 @@ fn in_the_plane_of_a_face_or_on_the_line_of_an_edge_rows_are_continuous() {
             }
         }
     }
+}
+
+/// The row of `point` face by face, each seen closely.
+fn seen_closely(surface: &Surface, point: &Point) -> Vec<f64> {
+    let (row, _) = surface.seen_closely(point);
+    let sum: f64 = row.iter().sum();
+    row.iter().map(|w| w / sum).collect()
+}
+
+#[test]
+fn all_instructions_give_the_rows_of_faces_seen_closely() {
+    for fixture in fixtures::all() {
+        let cage = fixture.cage();
+        let surface = Surface::new(cage.vertices(), cage.triangles());
+        // An odd number of them, so that some lanes are left over.
+        let points: Vec<Point> =
+            points_around(&cage, 100, 7).into_iter().chain(fixture.skin).take(333).collect();
+        let expected: Vec<f64> = points.iter().flat_map(|point| seen_closely(&surface, point)).collect();
+        for path in Path::available() {
+            let mut rows = vec![0.0; expected.len()];
+            let (progress, mut done) = (Progress::default(), Ok(()));
+            let part = &progress.whole();
+            let (surface, points, rows_of) = (&surface, &points, &mut rows);
+            path.run(Weigh { surface, points, correction: None, rows: rows_of, part, done: &mut done });
+            let worst = rows.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-11, "{} {}: {worst:e}", fixture.name, path.name());
+        }
+    }
+}
+
+#[test]
+fn pieces_of_a_mesh_weigh_as_much_as_the_whole_and_each_looks_for_a_cancel() {
+    let (vertices, triangles) = fixtures::shapes::icosphere(4);
+    let triangles: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| v as u32)).collect();
+    let surface = Surface::new(&vertices, &triangles);
+    assert!(surface.patches.len() >= 10);
+    assert!(surface.patches.iter().all(|patch| patch.faces.len() <= 512));
+    assert_eq!(surface.patches.iter().map(|patch| patch.faces.len()).sum::<usize>(), triangles.len());
+    let point = Point::new(0.3, -0.2, 0.4);
+    let mut row = vec![0.0; vertices.len()];
+    let progress = Progress::default();
+    surface.weights(&[point], &mut row, &progress.whole()).expect("nobody cancels");
+    let worst =
+        row.iter().zip(seen_closely(&surface, &point)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-14, "{worst:e}");
+    progress.cancel();
+    assert_eq!(surface.weights(&[point], &mut row, &progress.whole()), Err(Cancelled));
 }
 
 #[test]

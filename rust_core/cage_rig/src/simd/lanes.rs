@@ -11,6 +11,9 @@ const MOST: usize = 16;
 /// A vector of `L`.
 pub(crate) type Vector<L> = <L as Simd>::f32s;
 
+/// A vector of `L` in double precision.
+pub(crate) type Double<L> = <L as Simd>::f64s;
+
 /// Vectors of `F32_LANES` numbers.
 pub(crate) trait Lanes: Simd {
     /// Lanes for work that gathers short rows: four or eight.
@@ -21,6 +24,12 @@ pub(crate) trait Lanes: Simd {
     /// a b + c.
     fn fused(self, a: Self::f32s, b: Self::f32s, c: Self::f32s) -> Self::f32s {
         self.mul_add_f32s(a, b, c)
+    }
+
+    /// a b + c.
+    #[inline(always)]
+    fn fused_double(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s {
+        self.mul_add_f64s(a, b, c)
     }
 
     /// The first vector of `numbers`.
@@ -91,6 +100,11 @@ impl Lanes for Scalar128b {
     #[inline(always)]
     fn fused(self, a: Self::f32s, b: Self::f32s, c: Self::f32s) -> Self::f32s {
         self.add_f32s(self.mul_f32s(a, b), c)
+    }
+
+    #[inline(always)]
+    fn fused_double(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s {
+        self.add_f64s(self.mul_f64s(a, b), c)
     }
 }
 

@@ -9,7 +9,7 @@ mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub(crate) use lanes::{Lanes, Vector};
+pub(crate) use lanes::{Double, Lanes, Vector};
 
 #[cfg(target_arch = "aarch64")]
 use pulp::aarch64::Neon;
