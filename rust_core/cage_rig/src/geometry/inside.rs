@@ -2,26 +2,52 @@
 //!
 //! An edge is crossed by the half-open rule of scan conversion and with its ends in one order,
 //! whichever triangle asks: neighbours agree to the last bit, so a ray through an edge or a corner
-//! is counted once. `#triangles` a point.
+//! is counted once. A point looks at the triangles of its slab along z.
 
 use crate::points::Point;
 
 /// A closed triangle mesh, asked about many points.
 pub struct Enclosure<'a> {
     vertices: &'a [Point],
-    triangles: &'a [[u32; 3]],
+    /// The triangles that each slab has a part of.
+    slabs: Vec<Vec<[u32; 3]>>,
+    low: f64,
+    high: f64,
 }
+
+/// Most slabs.
+const SLABS: usize = 1024;
 
 impl<'a> Enclosure<'a> {
     /// The volume that `triangles` over `vertices` (`#V by 3`) enclose.
     pub fn new(vertices: &'a [Point], triangles: &'a [[u32; 3]]) -> Self {
-        Self { vertices, triangles }
+        let heights = |corners: &[u32; 3]| corners.map(|v| vertices[v as usize].z);
+        let all = triangles.iter().flat_map(heights);
+        let (low, high) =
+            all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (z.min(low), z.max(high)));
+        let slabs = vec![Vec::new(); triangles.len().clamp(1, SLABS)];
+        let mut enclosure = Self { vertices, slabs, low, high };
+        for corners in triangles {
+            let [a, b, c] = heights(corners).map(|z| enclosure.slab(z));
+            let (first, last) = (a.min(b).min(c), a.max(b).max(c));
+            enclosure.slabs[first..=last].iter_mut().for_each(|slab| slab.push(*corners));
+        }
+        enclosure
     }
 
     /// Whether `point` is inside. On the surface it may be either.
     pub fn contains(&self, point: &Point) -> bool {
-        let crossings = self.triangles.iter().filter(|corners| self.is_crossed(corners, point)).count();
-        crossings % 2 == 1
+        if !(self.low..=self.high).contains(&point.z) {
+            return false;
+        }
+        let slab = self.slabs[self.slab(point.z)].iter();
+        slab.filter(|corners| self.is_crossed(corners, point)).count() % 2 == 1
+    }
+
+    /// The slab of a height. Never falls as heights rise, so a triangle's are all between its corners'.
+    fn slab(&self, z: f64) -> usize {
+        let part = (z - self.low) / (self.high - self.low);
+        ((part * self.slabs.len() as f64) as usize).min(self.slabs.len() - 1)
     }
 
     /// Whether the ray from `point` along +x crosses the triangle.
