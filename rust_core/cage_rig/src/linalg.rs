@@ -49,6 +49,30 @@ pub(crate) fn long_product(a: &Rows, b: &Rows, part: &Part) -> Result<Rows, Canc
     Ok(out)
 }
 
+/// What `visit` finds in each block of rows of A · B, from their first one on; the product is not kept.
+pub(crate) fn each_product<T: Send>(
+    a: &Rows,
+    b: &Rows,
+    part: &Part,
+    visit: impl Fn(usize, &[f64]) -> T + Sync,
+) -> Result<Vec<T>, Cancelled> {
+    let (inner, width) = (a.columns(), b.columns());
+    let count = part.count(a.len());
+    let blocks = a.as_slice().par_chunks(PRODUCT_ROWS * inner.max(1)).enumerate();
+    let found = blocks.map_init(
+        || vec![0.0; PRODUCT_ROWS * width],
+        |out, (block, a)| {
+            let rows = a.len() / inner;
+            let left = MatRef::from_row_major_slice(a, rows, inner);
+            let target = MatMut::from_row_major_slice_mut(&mut out[..rows * width], rows, width);
+            matmul(target, Accum::Replace, left, view(b), 1.0, Par::Seq);
+            count.step(rows)?;
+            Ok(visit(block * PRODUCT_ROWS, &out[..rows * width]))
+        },
+    );
+    found.collect()
+}
+
 /// The factors of a square matrix, made once and solved with often.
 #[derive(Debug, Clone)]
 pub(crate) struct Lu {

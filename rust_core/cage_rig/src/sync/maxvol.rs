@@ -4,15 +4,20 @@
 //! The anchors of [CTL*20] Eq. (8): c skin vertices whose rows Φ̃ determine the cage best, in the
 //! sense that every other row is a combination of theirs with coefficients of about 1 at most
 //! (max |Φ Φ̃⁻¹| ≤ `max_ratio`). Row-pivoted elimination on the most touched vertices of each
-//! column, then swaps on the whole matrix. Cost: `#M · #C²` plus `#M · #C` a swap.
+//! column, then swaps among the rows that break the limit. Cost: `#M · #C²` a look at all of them, of
+//! which there are few, and no copy of Φ.
 
-use crate::linalg::{long_product, Lu};
+use crate::linalg::{each_product, long_product, Lu};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use rayon::prelude::*;
 
 /// The rows tried first: this many with the largest entries of each column.
 const CANDIDATES_PER_COLUMN: usize = 40;
+/// Rows that one thread looks at at a time.
+const SEEN_AT_ONCE: usize = 8192;
+/// Rows that break the limit are tried together, at most this many a column.
+const TRIED_PER_COLUMN: usize = 16;
 /// A pivot below this part of its column depends on the columns before it.
 const DEPENDENT: f64 = 1e-13;
 
@@ -64,7 +69,8 @@ pub fn maxvol(coords: &Rows, options: &MaxVolOptions, part: &Part) -> Result<Max
 /// max |Φ Φ̃⁻¹| of a given choice of as many rows as columns.
 pub fn ratio_of(coords: &Rows, rows: &[usize], part: &Part) -> Result<f64, Cancelled> {
     let all: Vec<usize> = (0..coords.columns()).collect();
-    Ok(largest(&ratios(coords, &column_scale(coords), &all, rows, part)?).2)
+    let right = right_factor(coords, &column_scale(coords), &all, rows);
+    Ok(beyond(coords, &right, f64::INFINITY, part)?.0)
 }
 
 /// One over the largest entry of each column (0 for a column of zeros). Scaling columns changes
@@ -85,14 +91,8 @@ fn scaled(coords: &Rows, scale: &[f64], rows: &[usize]) -> Rows {
     chosen
 }
 
-/// B = Φ Φ̃⁻¹ over the independent columns, without a copy of Φ: Φ D (Φ̃ D)⁻¹ with D the scale.
-fn ratios(
-    coords: &Rows,
-    scale: &[f64],
-    independent: &[usize],
-    rows: &[usize],
-    part: &Part,
-) -> Result<Rows, Cancelled> {
+/// D (Φ̃ D)⁻¹ over the independent columns, with D the scale: Φ times it is B = Φ Φ̃⁻¹.
+fn right_factor(coords: &Rows, scale: &[f64], independent: &[usize], rows: &[usize]) -> Rows {
     let anchors = scaled(coords, scale, rows);
     let mut square = Rows::zeros(rows.len(), independent.len());
     for i in 0..rows.len() {
@@ -104,7 +104,32 @@ fn ratios(
     for (i, &k) in independent.iter().enumerate() {
         right.row_mut(k).iter_mut().zip(inverse.row(i)).for_each(|(x, y)| *x = scale[k] * y);
     }
-    long_product(coords, &right, part)
+    right
+}
+
+/// max |B|, and the rows of B beyond `limit` with theirs, the largest first. B is never kept.
+fn beyond(
+    coords: &Rows,
+    right: &Rows,
+    limit: f64,
+    part: &Part,
+) -> Result<(f64, Vec<(f64, usize)>), Cancelled> {
+    let width = right.columns();
+    let blocks = each_product(coords, right, part, |first, block| {
+        let (mut most, mut rows) = (0.0f64, Vec::new());
+        for (i, row) in block.chunks_exact(width).enumerate() {
+            let ratio = row.iter().fold(0.0f64, |most, x| if x.abs() > most { x.abs() } else { most });
+            most = most.max(ratio);
+            if ratio > limit {
+                rows.push((ratio, first + i));
+            }
+        }
+        (most, rows)
+    })?;
+    let most = blocks.iter().fold(0.0, |most: f64, block| most.max(block.0));
+    let mut rows: Vec<(f64, usize)> = blocks.into_iter().flat_map(|block| block.1).collect();
+    rows.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    Ok((most, rows))
 }
 
 /// Pivots (row, column) of an elimination on the most touched rows, on all of them if those do
@@ -120,26 +145,64 @@ fn start(coords: &Rows, scale: &[f64], wanted: usize, part: &Part) -> Result<Vec
     Ok(pivots.into_iter().map(|(row, column)| (candidates[row], column)).collect())
 }
 
+/// The rows with the largest entries of each column, each once.
 fn most_touched(coords: &Rows, part: &Part) -> Result<Vec<usize>, Cancelled> {
-    let count = CANDIDATES_PER_COLUMN.min(coords.len());
-    let columns = part.count(coords.columns());
-    let chosen = (0..coords.columns())
-        .into_par_iter()
-        .map(|column| {
-            let mut rows: Vec<usize> = (0..coords.len()).collect();
-            if count < rows.len() {
-                let entry = |i: usize| coords.row(i)[column].abs();
-                rows.select_nth_unstable_by(count, |&i, &k| entry(k).total_cmp(&entry(i)).then(i.cmp(&k)));
+    let (columns, count) = (coords.columns(), part.count(coords.len()));
+    let blocks = coords.as_slice().par_chunks(SEEN_AT_ONCE * columns).enumerate();
+    let best = blocks.map(|(block, entries)| {
+        let mut best = vec![Best::default(); columns];
+        for (i, row) in entries.chunks_exact(columns).enumerate() {
+            for (best, entry) in best.iter_mut().zip(row).filter(|(best, entry)| entry.abs() > best.least) {
+                best.push(entry.abs(), block * SEEN_AT_ONCE + i);
             }
-            rows.truncate(count);
-            columns.step(1)?;
-            Ok(rows)
-        })
-        .collect::<Result<Vec<_>, Cancelled>>()?;
-    let mut chosen = chosen.concat();
+        }
+        count.step(entries.len() / columns)?;
+        Ok(best)
+    });
+    let merge = |mut a: Vec<Best>, b: Vec<Best>| {
+        a.iter_mut().zip(b).for_each(|(a, b)| b.found.iter().for_each(|&(entry, row)| a.push(entry, row)));
+        Ok(a)
+    };
+    let mut best = best.try_reduce_with(merge).unwrap_or(Ok(Vec::new()))?;
+    best.iter_mut().for_each(Best::shorten);
+    let mut chosen: Vec<usize> =
+        best.iter().flat_map(|best| best.found.iter().map(|(_, row)| *row)).collect();
     chosen.sort_unstable();
     chosen.dedup();
     Ok(chosen)
+}
+
+/// The largest entries of a column and their rows, some more than are wanted; what is not above
+/// `least` need not be tried.
+#[derive(Clone)]
+struct Best {
+    least: f64,
+    found: Vec<(f64, usize)>,
+}
+
+impl Default for Best {
+    fn default() -> Self {
+        Self { least: -1.0, found: Vec::new() }
+    }
+}
+
+impl Best {
+    fn push(&mut self, entry: f64, row: usize) {
+        self.found.push((entry, row));
+        if self.found.len() >= 4 * CANDIDATES_PER_COLUMN {
+            self.shorten();
+        }
+    }
+
+    fn shorten(&mut self) {
+        if self.found.len() <= CANDIDATES_PER_COLUMN {
+            return;
+        }
+        let larger = |a: &(f64, usize), b: &(f64, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+        let (_, last, _) = self.found.select_nth_unstable_by(CANDIDATES_PER_COLUMN - 1, larger);
+        self.least = last.0;
+        self.found.truncate(CANDIDATES_PER_COLUMN);
+    }
 }
 
 /// Gaussian elimination with row pivots, column by column, skipping dependent columns.
@@ -170,9 +233,9 @@ fn eliminate(mut work: Rows, part: &Part) -> Result<Vec<(usize, usize)>, Cancell
     Ok(pivots)
 }
 
-/// Swaps a chosen row for the row that depends on it most, until no ratio is above the limit.
-/// Each swap updates B = Φ Φ̃⁻¹ by rank one; at the end B is made afresh, so that the ratio
-/// returned is not a sum of rounding.
+/// Swaps chosen rows for rows that depend on them most, until no ratio is above the limit. B is
+/// looked through in blocks; swaps are made among the rows that break the limit, each a change of their
+/// part of B by rank one. Every look starts afresh, so that the ratio returned is no sum of rounding.
 fn improve(
     coords: &Rows,
     scale: &[f64],
@@ -181,24 +244,27 @@ fn improve(
     options: &MaxVolOptions,
     part: &Part,
 ) -> Result<(f64, usize), Cancelled> {
-    let [first, swapping] = part.split([1.0, 4.0]);
+    let [first, swapping] = part.split([4.0, 1.0]);
     let mut swaps = 0;
     loop {
+        let right = right_factor(coords, scale, independent, rows);
+        let (ratio, mut tried) = beyond(coords, &right, options.max_ratio, &first)?;
+        tried.truncate(TRIED_PER_COLUMN * coords.columns());
+        let tried: Vec<usize> = tried.into_iter().map(|(_, row)| row).collect();
+        let mut ratios = long_product(&coords.select(&tried), &right, &first)?;
         let before = swaps;
-        let mut ratios = ratios(coords, scale, independent, rows, &first)?;
-        let fresh = largest(&ratios).2;
-        loop {
+        while !tried.is_empty() && swaps < options.max_swaps {
             let (row, column, ratio) = largest(&ratios);
-            if ratio <= options.max_ratio || swaps >= options.max_swaps || !ratio.is_finite() {
+            if ratio <= options.max_ratio || !ratio.is_finite() {
                 break;
             }
             swap(&mut ratios, row, column);
-            rows[column] = row;
+            rows[column] = tried[row];
             swaps += 1;
             swapping.reach(1.0 - 1.0 / (1.0 + swaps as f64 / USUAL_SWAPS))?;
         }
-        if swaps == before || swaps >= options.max_swaps {
-            return Ok((fresh, swaps));
+        if swaps == before {
+            return Ok((ratio, swaps));
         }
     }
 }
