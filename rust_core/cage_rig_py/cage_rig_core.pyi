@@ -98,6 +98,7 @@ class Report(TypedDict):
 class Work(TypedDict):
     anchor_factorisations: int
     reverse_factorisations: int
+    reverse_low_rank: int
     reverse_solves: int
     rest_passes: int
     rest_column_passes: int  # those of them that read few columns alone, as in a drag

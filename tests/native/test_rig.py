@@ -164,6 +164,7 @@ def test_work_and_report_are_plain_dictionaries(bar, bent):
     assert before == {
         "anchor_factorisations": 1,
         "reverse_factorisations": 0,
+        "reverse_low_rank": 0,
         "reverse_solves": 0,
         "rest_passes": 0,
         "rest_column_passes": 0,

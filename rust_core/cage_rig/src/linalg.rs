@@ -117,6 +117,12 @@ impl Lu {
         (0..x.nrows() / 3).map(|i| Point::new(x[(3 * i, 0)], x[(3 * i + 1, 0)], x[(3 * i + 2, 0)])).collect()
     }
 
+    /// Solves for one right side.
+    pub(crate) fn solve_one(&self, right: &[f64]) -> Vec<f64> {
+        let x = self.factors.solve(&Mat::from_fn(right.len(), 1, |i, _| right[i]));
+        (0..x.nrows()).map(|i| x[(i, 0)]).collect()
+    }
+
     /// A⁻¹.
     pub(crate) fn inverse(&self) -> Rows {
         let size = self.factors.U().nrows();

@@ -67,6 +67,15 @@ impl Rows {
         Self { columns: self.columns, data }
     }
 
+    /// Columns for rows.
+    pub(crate) fn transposed(&self) -> Self {
+        let mut out = Self::zeros(self.columns, self.len());
+        for i in 0..self.len() {
+            self.row(i).iter().enumerate().for_each(|(k, x)| out.row_mut(k)[i] = *x);
+        }
+        out
+    }
+
     /// Row `index` times `points` (`#columns by 3`).
     pub fn combine(&self, index: usize, points: &[Point]) -> Point {
         self.row(index).iter().zip(points).map(|(w, p)| *w * p).sum()

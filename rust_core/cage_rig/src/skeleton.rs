@@ -58,6 +58,15 @@ impl Skeleton {
         self.parents[joint]
     }
 
+    /// Whether each joint is `joint` or hangs on it.
+    pub(crate) fn below(&self, joint: usize) -> Vec<bool> {
+        let mut below = vec![false; self.len()];
+        for &j in self.parents_first() {
+            below[j] = j == joint || self.parent(j).is_some_and(|parent| below[parent]);
+        }
+        below
+    }
+
     /// Every joint once, each after its parent.
     pub fn parents_first(&self) -> &[usize] {
         &self.order

@@ -5,7 +5,7 @@ mod common;
 use cage_rig::skinning::METHODS;
 use cage_rig::sync::BindInput;
 use cage_rig::{CoupledRig, Point, PoseError, Transform};
-use common::{all, arm, distance, lively_pose, nudged, points, Fixture};
+use common::{all, arm, distance, forward, lively_pose, nudged, points, turn, Fixture};
 
 fn cage_size(fixture: &Fixture) -> f64 {
     cage_rig::bounding_diagonal(&fixture.cage)
@@ -245,6 +245,38 @@ fn work_is_done_once_and_only_when_it_is_due() {
         rig.edit_posed_cage(&posed_cage).expect("a solvable pose");
         assert_eq!(rig.work().reverse_factorisations, 2);
     }
+}
+
+#[test]
+fn a_drag_costs_by_the_joints_that_are_bent() {
+    let mut low_rank = 0;
+    for fixture in all() {
+        let mut rig = fixture.rig();
+        let last = fixture.joints.len() - 1;
+        let mut local = vec![Transform::identity(); fixture.joints.len()];
+        local[last] = turn(fixture.joints[last], Point::new(0.3, 0.2, 1.0), 0.5);
+        rig.pose(&forward(&fixture, &local), None).expect("a valid pose");
+        for step in 1..=3 {
+            let wanted = nudged(rig.posed_cage(), 0.01 * fixture.size(), step);
+            rig.edit_posed_cage(&wanted).expect("a solvable pose");
+            let (cage, transforms) = (rig.rest_cage().to_vec(), forward(&fixture, &local));
+            let mut again = fixture.rig();
+            again.play(&cage, &transforms, None).expect("a valid frame");
+            assert!(distance(again.posed_cage(), &wanted) < 1e-9 * fixture.size(), "{}", fixture.name);
+        }
+        let work = rig.work();
+        assert!(work.reverse_factorisations <= 1 + work.reverse_low_rank);
+        low_rank += work.reverse_low_rank;
+        // All joints bent: dense.
+        let before = work.reverse_low_rank;
+        rig.pose(&lively_pose(&fixture, 0.5), None).expect("a valid pose");
+        let wanted = nudged(rig.posed_cage(), 0.001, 9);
+        rig.edit_posed_cage(&wanted).expect("a solvable pose");
+        if 3 * fixture.joints.len() > fixture.cage.len() {
+            assert_eq!(rig.work().reverse_low_rank, before);
+        }
+    }
+    assert!(low_rank > 0);
 }
 
 #[test]

@@ -351,6 +351,7 @@ impl CoupledRig {
         let work = PyDict::new(py);
         work.set_item("anchor_factorisations", done.anchor_factorisations)?;
         work.set_item("reverse_factorisations", done.reverse_factorisations)?;
+        work.set_item("reverse_low_rank", done.reverse_low_rank)?;
         work.set_item("reverse_solves", done.reverse_solves)?;
         work.set_item("rest_passes", done.rest_passes)?;
         work.set_item("rest_column_passes", done.rest_column_passes)?;

@@ -10,7 +10,7 @@
 //! Where nothing is below τ this is Eq. (8). All in displacements from rest, exact at rest.
 
 use super::joint_coordinates::SkinAtRest;
-use crate::linalg::{product, svd, Lu};
+use crate::linalg::{product, svd, Lu, Svd};
 use crate::points::{Matrix3, Point, Transform};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
@@ -28,6 +28,7 @@ pub struct CageUpdater {
     anchor_weights: SkinWeights,
     cage: Vec<Point>,
     fit: Fit,
+    base: Option<Base>,
     condition: f64,
 }
 
@@ -38,6 +39,32 @@ pub struct FitScratch {
     rest: Vec<Point>,
     steps: Vec<Point>,
     numbers: Vec<f64>,
+}
+
+/// Φ̂ and its inverse: Φ̃ with no singular value below the limit.
+#[derive(Debug, Clone)]
+pub(super) struct Base {
+    /// Φ̂, `#C by #C`.
+    pub(super) matrix: Rows,
+    /// Φ̂⁻¹.
+    pub(super) inverse: Rows,
+    /// How it differs from Φ̃.
+    pub(super) attenuated: Option<Attenuated>,
+}
+
+/// The directions that are attenuated.
+#[derive(Debug, Clone)]
+pub(super) struct Attenuated {
+    /// Columns of U, as rows over the anchors.
+    pub(super) left: Rows,
+    /// Columns of V, as rows over the cage.
+    pub(super) right: Rows,
+    /// Their singular values.
+    pub(super) strengths: Vec<f64>,
+    /// τ.
+    pub(super) limit: f64,
+    /// The weights of C_s.
+    pub(super) cage_weights: SkinWeights,
 }
 
 /// How the cage is found from the anchors.
@@ -69,13 +96,14 @@ impl CageUpdater {
         part: &Part,
     ) -> Result<Self, Cancelled> {
         let anchor_coords = skin.cage_coords.select(anchors);
-        let (fit, condition) = fit(&anchor_coords, min_singular, || cage_skin_weights(skin, part))?;
+        let (fit, base, condition) = fit(&anchor_coords, min_singular, || cage_skin_weights(skin, part))?;
         Ok(Self {
             anchor_coords,
             anchor_rest: anchors.iter().map(|&i| skin.vertices[i]).collect(),
             anchor_weights: skin.weights.select(anchors),
             cage: cage.to_vec(),
             fit,
+            base,
             condition,
         })
     }
@@ -126,6 +154,11 @@ impl CageUpdater {
         posed.iter_mut().zip(cage).for_each(|(step, c)| *step += c);
     }
 
+    /// Φ̂, where there are as many anchors as cage vertices.
+    pub(super) fn base(&self) -> Option<&Base> {
+        self.base.as_ref()
+    }
+
     pub(super) fn side(&self) -> Side<'_> {
         match &self.fit {
             Fit::Exact(_) => Side::Anchors,
@@ -155,10 +188,10 @@ fn fit(
     anchor_coords: &Rows,
     min_singular: f64,
     cage_weights: impl Fn() -> Result<SkinWeights, Cancelled>,
-) -> Result<(Fit, f64), Cancelled> {
+) -> Result<(Fit, Option<Base>, f64), Cancelled> {
     let count = anchor_coords.columns();
-    let exact = |condition| Ok((Fit::Exact(Lu::new(anchor_coords)), condition));
-    let Some(svd) = svd(anchor_coords) else { return exact(f64::INFINITY) };
+    let lu = Lu::new(anchor_coords);
+    let Some(svd) = svd(anchor_coords) else { return Ok((Fit::Exact(lu), None, f64::INFINITY)) };
     let largest = svd.singular_values.first().copied().unwrap_or(0.0);
     let smallest = svd.singular_values.last().copied().unwrap_or(0.0);
     let missing = count - svd.singular_values.len();
@@ -166,30 +199,46 @@ fn fit(
     let limit = min_singular * largest;
     let attenuated = missing + svd.singular_values.iter().filter(|s| **s < limit).count();
     if attenuated == 0 {
-        return exact(condition);
+        let base = Base { matrix: anchor_coords.clone(), inverse: lu.inverse(), attenuated: None };
+        return Ok((Fit::Exact(lu), Some(base), condition));
     }
-    let mut scaled = svd.v;
+    let mut scaled = svd.v.clone();
     for k in 0..count {
         for (x, &s) in scaled.row_mut(k).iter_mut().zip(&svd.singular_values) {
             *x *= if s >= limit { 1.0 / s } else { s / (limit * limit) };
         }
     }
-    let from_anchors = product(&scaled, &transposed(&svd.u));
+    let from_anchors = product(&scaled, &svd.u.transposed());
     let mut from_cage = product(&from_anchors, anchor_coords);
     for k in 0..count {
         from_cage.row_mut(k).iter_mut().for_each(|x| *x = -*x);
         from_cage.row_mut(k)[k] += 1.0;
     }
     let cage_weights = cage_weights()?;
-    Ok((Fit::Regularised { from_anchors, from_cage, cage_weights, attenuated }, condition))
+    let base = (missing == 0).then(|| base(anchor_coords, &svd, limit, &cage_weights));
+    Ok((Fit::Regularised { from_anchors, from_cage, cage_weights, attenuated }, base, condition))
 }
 
-fn transposed(matrix: &Rows) -> Rows {
-    let mut out = Rows::zeros(matrix.columns(), matrix.len());
-    for i in 0..matrix.len() {
-        matrix.row(i).iter().enumerate().for_each(|(k, x)| out.row_mut(k)[i] = *x);
+fn base(anchor_coords: &Rows, svd: &Svd, limit: f64, cage_weights: &SkinWeights) -> Base {
+    let (u, v) = (svd.u.transposed(), svd.v.transposed());
+    let values = &svd.singular_values;
+    let small: Vec<usize> = (0..values.len()).filter(|&k| values[k] < limit).collect();
+    let (left, right) = (u.select(&small), v.select(&small));
+    let strengths: Vec<f64> = small.iter().map(|&k| values[k]).collect();
+    let mut matrix = anchor_coords.clone();
+    for (q, strength) in strengths.iter().enumerate() {
+        for i in 0..matrix.len() {
+            let factor = left.row(q)[i] * (limit - strength);
+            matrix.row_mut(i).iter_mut().zip(right.row(q)).for_each(|(x, v)| *x += factor * v);
+        }
     }
-    out
+    let mut scaled = svd.v.clone();
+    for k in 0..scaled.len() {
+        scaled.row_mut(k).iter_mut().zip(values).for_each(|(x, s)| *x /= s.max(limit));
+    }
+    let inverse = product(&scaled, &u);
+    let attenuated = Attenuated { left, right, strengths, limit, cage_weights: cage_weights.clone() };
+    Base { matrix, inverse, attenuated: Some(attenuated) }
 }
 
 /// The skin weights carried over to the cage: w_k = Σ_i φ_ik² ω_i / Σ_i φ_ik² over the skin that it

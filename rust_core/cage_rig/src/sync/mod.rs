@@ -20,6 +20,7 @@ mod drag;
 mod frame;
 mod ground;
 pub mod joint_coordinates;
+mod low_rank;
 pub mod max_entropy;
 pub mod maxvol;
 pub mod reach;

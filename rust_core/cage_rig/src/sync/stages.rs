@@ -29,14 +29,14 @@ impl<'a> Stages<'a> {
         let no_centers = !input.method.centers || known.center_coords.is_some();
         let [coordinates, reach, anchors, joints, posed_cage, frame, surroundings, centers] =
             progress.whole().split([
-                unless(known.cage_coords.is_some(), 140.0 * skin * faces),
-                10.0 * skin * faces,
-                unless(known.anchors.is_some(), 120.0 * skin * cage),
-                unless(known.joint_coords.is_some(), 75.0 * joints * corners),
+                unless(known.cage_coords.is_some(), 25.0 * skin * faces),
+                4.0 * skin * faces,
+                unless(known.anchors.is_some(), 25.0 * skin * cage),
+                unless(known.joint_coords.is_some(), 19.0 * joints * corners),
                 20.0 * cage.powi(3),
                 20.0 * skin * cage,
                 5.0 * skin * joints,
-                unless(no_centers, 750.0 * skin * cage),
+                unless(no_centers, 600.0 * skin * cage),
             ]);
         Self { coordinates, reach, anchors, joints, posed_cage, frame, surroundings, centers }
     }

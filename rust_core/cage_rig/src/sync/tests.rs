@@ -47,12 +47,16 @@ fn whole(joints: usize) -> Vec<f64> {
 }
 
 fn parts(fixture: &Fixture) -> (CageUpdater, SkeletonUpdater) {
+    parts_attenuated(fixture, 1e-3)
+}
+
+fn parts_attenuated(fixture: &Fixture, limit: f64) -> (CageUpdater, SkeletonUpdater) {
     let cage = fixture.cage();
     let coords = coordinates(&cage, &fixture.skin);
     let anchors = maxvol(&coords).rows;
     let weights = SkinWeights::from_dense(&fixture.weights).expect("valid weights");
     let joint_coords = fixture.rig().joint_coords().clone();
-    let cage_updater = cage_updater(&anchors, &at_rest(fixture, &coords, &weights), cage.vertices(), 1e-3);
+    let cage_updater = cage_updater(&anchors, &at_rest(fixture, &coords, &weights), cage.vertices(), limit);
     (cage_updater, SkeletonUpdater::new(skeleton(fixture), joint_coords))
 }
 
@@ -82,9 +86,35 @@ fn the_reverser_solves_equation_19_as_printed() {
     let system = reverse_matrix(&cage, &gradient, &linear);
     let step = fixtures::nudged(&vec![Point::zeros(); fixture.cage.len()], 1.0, 5);
     let expected = Lu::new(&system).solve_interleaved(&cage.anchor_coords().times(&step));
-    let found = CageReverser::new(&cage, &updater, &linear, &whole(linear.len()));
-    let found = found.expect("a solvable pose").solve(&step);
+    let found = CageReverser::dense(&cage, &updater, &linear, &whole(linear.len()));
+    let found = found.expect("a solvable pose").solve(&cage, &step);
     assert!(fixtures::distance(&found, &expected) < 1e-10);
+}
+
+#[test]
+fn few_bent_joints_are_solved_by_low_rank_and_equal_the_dense_factors() {
+    let (mut exact, mut attenuated) = (0, 0);
+    for fixture in fixtures::all() {
+        for limit in [1e-3, 0.02, 0.05, 0.1, 0.2] {
+            let (cage, updater) = parts_attenuated(&fixture, limit);
+            let shares: Vec<f64> = (0..fixture.joints.len()).map(|j| 1.0 - 0.1 * j as f64).collect();
+            let mut linear = vec![fixtures::rotation(Point::new(0.3, 1.0, 0.2), 0.4); fixture.joints.len()];
+            let last = linear.len() - 1;
+            linear[last] = fixtures::rotation(Point::new(1.0, 0.1, 0.4), 0.9) * linear[last] * 1.1;
+            let found = CageReverser::new(&cage, &updater, &linear, &shares).expect("a solvable pose");
+            let dense = CageReverser::dense(&cage, &updater, &linear, &shares).expect("a solvable pose");
+            assert!(!dense.is_low_rank());
+            if !found.is_low_rank() {
+                continue;
+            }
+            *if cage.attenuated() > 0 { &mut attenuated } else { &mut exact } += 1;
+            let step = fixtures::nudged(&vec![Point::zeros(); fixture.cage.len()], 1.0, 5);
+            let (found, expected) = (found.solve(&cage, &step), dense.solve(&cage, &step));
+            let size = expected.iter().map(|p| p.norm()).fold(0.0, f64::max);
+            assert!(fixtures::distance(&found, &expected) < 1e-9 * size, "{} {limit}", fixture.name);
+        }
+    }
+    assert!(exact > 0 && attenuated > 0, "{exact} exact fits and {attenuated} attenuated ones by low rank");
 }
 
 #[test]

@@ -7,6 +7,8 @@ pub struct Work {
     pub anchor_factorisations: usize,
     /// Factorisations of Eq. (19).
     pub reverse_factorisations: usize,
+    /// Those of them by low rank.
+    pub reverse_low_rank: usize,
     /// Solves with them.
     pub reverse_solves: usize,
     /// Products with Φ over the whole skin.
