@@ -32,7 +32,8 @@ lint: $(VENV)/.core
 bench: $(VENV)/.extension
 	$(PY) tools/with_extension.py tests/bench/bench_blender.py
 	$(PY) tests/bench/bench_caging.py
-	cargo bench --quiet -p cage_rig --bench skinning --bench binding
+	$(PY) tests/bench/bench_kernels.py
+	cargo bench --quiet -p cage_rig --bench frames --bench skinning --bench binding
 
 fixtures: $(VENV)/.extension
 	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures

@@ -173,6 +173,13 @@ def test_only_linalg_names_faer() -> None:
     assert named == ["linalg.rs"]
 
 
+def test_only_simd_names_pulp_and_knows_nothing_else() -> None:
+    named = {path.parent.name for path in CORE.rglob("*.rs") if re.search(r"\bpulp\b\s*(::|;)", path.read_text())}
+    assert named == {"simd"}
+    for path, modules in uses("simd").items():
+        assert not modules, path
+
+
 def test_the_core_knows_no_python_and_no_files() -> None:
     manifest = tomllib.loads((CORE.parent / "Cargo.toml").read_text())
     assert not {"pyo3", "numpy"} & set(manifest["dependencies"])

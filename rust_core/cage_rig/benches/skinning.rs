@@ -1,14 +1,12 @@
-//! What skinning costs: `cargo bench -p cage_rig --bench skinning`.
+//! What centers of rotation cost: `cargo bench -p cage_rig --bench skinning`. Frames: see `frames.rs`.
 //!
-//! - frame: 40,000 vertices of four bones each, one thread; a character in close-up.
 //! - centers: 120,066 vertices under 98 bones, 44 cage vertices; the paper's largest rig. The plain
 //!   integral, here of some vertices, takes minutes and says how far off the bins are.
 #![allow(clippy::print_stdout, missing_docs)]
 
-use cage_rig::simd::Path;
 use cage_rig::skinning::centers::{centers, CenterOptions};
-use cage_rig::skinning::{FrameWeights, PackedWeights, Scratch, SkinningInput, METHODS};
-use cage_rig::{unwatched, Matrix3, Point, Rows, SkinWeights, Transform};
+use cage_rig::skinning::PackedWeights;
+use cage_rig::{unwatched, Point, Rows, SkinWeights};
 use std::time::Instant;
 
 /// A bumpy tube along x with its weights, four bones a vertex.
@@ -39,41 +37,6 @@ fn snake(rings: usize, around: usize, joints: usize) -> Snake {
     let triangles = quads.flat_map(|(i, next)| [[i, next, next + a], [i, next + a, i + a]]).collect();
     let weights = SkinWeights::from_compressed(joints, &starts, &indices, &data).expect("valid weights");
     Snake { skin, triangles, weights }
-}
-
-fn pose(joints: usize, scaled: bool) -> Vec<Transform> {
-    let turn = |j: usize| {
-        let (sin, cos) = (0.4 * (j as f64).sin()).sin_cos();
-        let linear = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
-        let linear = if scaled { linear * 1.1 } else { linear };
-        let place = Point::new(j as f64, 0.0, 0.0);
-        Transform { linear, translation: place - linear * place }
-    };
-    (0..joints).map(turn).collect()
-}
-
-fn best_of(times: usize, mut work: impl FnMut()) -> f64 {
-    let one = |_| {
-        let start = Instant::now();
-        work();
-        start.elapsed().as_secs_f64()
-    };
-    (0..times).map(one).fold(f64::INFINITY, f64::min)
-}
-
-fn frame() {
-    let snake = snake(400, 100, 60);
-    let weights = FrameWeights::new(&snake.weights);
-    let (mut posed, mut scratch, path) = (snake.skin.clone(), Scratch::default(), Path::default());
-    for (what, transforms) in [("rigid", pose(60, false)), ("scaled", pose(60, true))] {
-        for method in METHODS {
-            let (transforms, rest_skin) = (&transforms[..], &snake.skin[..]);
-            let input = SkinningInput { path, transforms, weights: &weights, rest_skin, centers: rest_skin };
-            let seconds = best_of(50, || (method.pose)(&input, &mut scratch, &mut posed));
-            assert!(posed.iter().flatten().all(|x| x.is_finite()));
-            println!("frame {what:6} {}: {:5.1} ns/vertex", method.name, seconds * 1e9 / 40_000.0);
-        }
-    }
 }
 
 fn integrate() {
@@ -133,7 +96,5 @@ fn error(snake: &Snake, found: &[f64], vertex: usize) -> f64 {
 }
 
 fn main() {
-    let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    single.install(frame);
     integrate();
 }

@@ -18,8 +18,8 @@ use strips::{halves, pack_half, pack_single, singles, Half, Single, Strips};
 
 /// Rows of a panel.
 const PANEL: usize = 32;
-/// Below this many multiply-adds of a coordinate one thread is faster than two.
-const PARALLEL_FROM: usize = 1 << 19;
+/// Below this many numbers one thread is faster than two.
+const PARALLEL_FROM: usize = 1 << 20;
 /// Panels that one thread takes at a time.
 const SHARE: usize = 64;
 /// Frames of one walk.
@@ -171,37 +171,38 @@ impl<const F: usize> Kernel for Write<'_, F> {
 impl<const F: usize> Write<'_, F> {
     #[inline(always)]
     fn of<L: Lanes, S: Strips>(self, lanes: L, panel: impl Fn(usize) -> S) {
-        let Self { product, first, steps, out, .. } = self;
-        let mut sums = [[[0.0f32; PANEL]; 3]; F];
+        let Self { product, first, steps, mut out, .. } = self;
         for (p, start) in (0..out[0].len()).step_by(PANEL).enumerate() {
             let strips = panel(p);
-            // As many sums at once as there are registers for.
-            match (F, L::F32_LANES) {
-                (1, 16) => one_frame::<L, S, 2, F>(lanes, strips, steps, &mut sums[0]),
-                (1, _) => one_frame::<L, S, 4, F>(lanes, strips, steps, &mut sums[0]),
-                _ => all_frames(lanes, strips, steps, &mut sums),
-            }
-            for f in 0..F {
-                let count = PANEL.min(out[f].len() - start);
-                finish(lanes, product, first + start, &mut sums[f], &mut out[f][start..start + count]);
+            for (f, out) in out.iter_mut().enumerate() {
+                // After the first frame the panel is in the first cache.
+                let mut sums = [[0.0f32; PANEL]; 3];
+                // As many sums at once as there are registers for.
+                match L::F32_LANES {
+                    16 => sum::<L, S, 2, F>(lanes, strips, steps, f, &mut sums),
+                    _ => sum::<L, S, 4, F>(lanes, strips, steps, f, &mut sums),
+                }
+                let count = PANEL.min(out.len() - start);
+                finish(lanes, product, first + start, &mut sums, &mut out[start..start + count]);
             }
         }
     }
 }
 
-/// Sums of a panel in the first of `F` frames, `V` vectors of rows at a time.
+/// Sums of a panel in frame `f`, `V` vectors of rows at a time.
 #[inline(always)]
-fn one_frame<L: Lanes, S: Strips, const V: usize, const F: usize>(
+fn sum<L: Lanes, S: Strips, const V: usize, const F: usize>(
     lanes: L,
     strips: S,
     steps: &[Step<F>],
+    f: usize,
     sums: &mut [[f32; PANEL]; 3],
 ) {
     for at in (0..PANEL).step_by(V * L::F32_LANES) {
         let zero = [lanes.splat_f32s(0.0); V];
         let (mut x, mut y, mut z) = (zero, zero, zero);
         for step in steps {
-            let (strip, [dx, dy, dz]) = (strips.strip(step.column), step.by[0]);
+            let (strip, [dx, dy, dz]) = (strips.strip(step.column), step.by[f]);
             let dx = lanes.splat_f32s(S::scaled(&strip, dx));
             let dy = lanes.splat_f32s(S::scaled(&strip, dy));
             let dz = lanes.splat_f32s(S::scaled(&strip, dz));
@@ -217,35 +218,6 @@ fn one_frame<L: Lanes, S: Strips, const V: usize, const F: usize>(
             lanes.store(&mut sums[0][row..], x[v]);
             lanes.store(&mut sums[1][row..], y[v]);
             lanes.store(&mut sums[2][row..], z[v]);
-        }
-    }
-}
-
-/// Sums of a panel in all frames, a vector of rows at a time.
-#[inline(always)]
-fn all_frames<L: Lanes, S: Strips, const F: usize>(
-    lanes: L,
-    strips: S,
-    steps: &[Step<F>],
-    sums: &mut [[[f32; PANEL]; 3]; F],
-) {
-    for at in (0..PANEL).step_by(L::F32_LANES) {
-        let zero = [lanes.splat_f32s(0.0); F];
-        let (mut x, mut y, mut z) = (zero, zero, zero);
-        for step in steps {
-            let strip = strips.strip(step.column);
-            let numbers = S::load(lanes, &strip, at);
-            for f in 0..F {
-                let [dx, dy, dz] = step.by[f];
-                x[f] = lanes.fused(numbers, lanes.splat_f32s(S::scaled(&strip, dx)), x[f]);
-                y[f] = lanes.fused(numbers, lanes.splat_f32s(S::scaled(&strip, dy)), y[f]);
-                z[f] = lanes.fused(numbers, lanes.splat_f32s(S::scaled(&strip, dz)), z[f]);
-            }
-        }
-        for f in 0..F {
-            lanes.store(&mut sums[f][0][at..], x[f]);
-            lanes.store(&mut sums[f][1][at..], y[f]);
-            lanes.store(&mut sums[f][2][at..], z[f]);
         }
     }
 }

@@ -105,7 +105,7 @@ fn chosen_columns_are_those_of_the_matrix() {
 #[test]
 fn threads_and_several_frames_change_no_bit() {
     let mut random = Random::new(4);
-    let (rows, columns) = (20_011, 40);
+    let (rows, columns) = (20_011, 60);
     let matrix = coordinates(rows, columns, &mut random);
     let from = points(rows, &mut random);
     let steps = steps::<FRAMES>(columns, &mut random);

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// Vertices of a block.
 const BLOCK: usize = 32;
 /// Below this many vertices one thread is faster than two.
-const PARALLEL_FROM: usize = 4096;
+const PARALLEL_FROM: usize = 8192;
 /// Vertices that one thread takes at a time.
 const SHARE: usize = 2048;
 

@@ -10,9 +10,6 @@ use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use crate::simd::Path;
 
-/// Numbers of Φ from which on four frames are made of one walk: below, Φ stays in the caches.
-const TOGETHER_FROM: usize = 1 << 20;
-
 /// M₀, C₀ and Φ.
 #[derive(Debug, Clone)]
 pub struct RestSkin {
@@ -97,11 +94,8 @@ impl RestSkin {
         rest: &mut [[f32; 3]],
     ) {
         let count = self.skin.len();
-        if cages.len() < 2 || count * self.cage.len() < TOGETHER_FROM {
-            for (cage, rest) in cages.iter().zip(rest.chunks_exact_mut(count)) {
-                self.write_whole(cage, confines, steps, rest);
-            }
-            return;
+        if let [cage] = cages {
+            return self.write_whole(cage, confines, steps, &mut rest[..count]);
         }
         let Confines { path, mask, offsets } = *confines;
         let cage_of = |frame: usize| cages[frame.min(cages.len() - 1)];
