@@ -33,12 +33,20 @@ def repaired(context: bpy.types.Context, points: Points, faces: Faces) -> tuple[
         context.scene.collection.objects.link(obj)
         depsgraph = context.evaluated_depsgraph_get()
         made = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), depsgraph=depsgraph)
-        return read_base(made), read_faces(made)
+        return _centred(read_base(made), points, 0.05 * size / CELLS), read_faces(made)
     finally:
         bpy.data.objects.remove(obj)
         for data in (mesh, made):
             if data is not None:
                 bpy.data.meshes.remove(data)
+
+
+def _centred(hull: Points, points: Points, reach: float) -> Points:
+    """The hull with its middle in x where that of the points is, so that their mirror planes are one."""
+    if not len(hull):
+        return hull
+    apart = 0.5 * float(points[:, 0].min() + points[:, 0].max() - hull[:, 0].min() - hull[:, 0].max())
+    return hull + np.float32([apart, 0.0, 0.0]) if abs(apart) < reach else hull
 
 
 def _fill_holes(mesh: bpy.types.Mesh) -> None:

@@ -7,9 +7,10 @@ from collections import Counter
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..adapters import positions, vertex_groups
-from ..generator import Cage
+from ..generator import Cage, Points
 from .character import Character
 from .course import OnBone
 from .options import Options
@@ -38,7 +39,8 @@ def write(
 ) -> bpy.types.Object:
     """Make the object, or give `cage` a new mesh in place of its own. Object Mode. Selects what Bind needs."""
     corners, sizes = (part.astype(np.int32) for part in made.faces)
-    points = made.points.astype(np.float32)
+    placed, correction = _placed(character.space)
+    points = positions.apply_matrix(correction, made.points)
     if cage is None:
         mesh = positions.new_mesh(f"{_name(character)} Cage", points, (corners, sizes))
         cage = bpy.data.objects.new(mesh.name, mesh)
@@ -49,7 +51,7 @@ def write(
         cage.data.clear_geometry()
         cage.vertex_groups.clear()
         positions.fill(cage.data, points, (corners, sizes))
-    cage.matrix_world = character.space.matrix_world
+    cage.matrix_world = placed
     owners = cage.data.attributes.new(SECTION, "INT", "POINT")
     owners.data.foreach_set("value", made.owners.astype(np.int32))
     bones = _bones(made, character)
@@ -58,6 +60,16 @@ def write(
     _remember(cage, character, options, nodes)
     _select(context, cage, character)
     return cage
+
+
+def _placed(space: bpy.types.Object) -> tuple[Matrix, Points]:
+    """Where the cage object is put, and what brings rig space to its own: more than nothing where rig space is sheared,
+    by parents of unequal scales, as no object without parents can be.
+    """
+    world = space.matrix_world
+    placed = Matrix.LocRotScale(*world.decompose())
+    left = np.linalg.inv(np.array(placed)) @ np.array(world)
+    return placed, np.eye(4) if np.abs(left - np.eye(4)).max() < 1e-6 else left
 
 
 def _name(character: Character) -> str:

@@ -334,6 +334,18 @@ def test_unapplied_transforms_do_not_matter(character: RigObjects) -> None:
     assert bpy.ops.cage_rig.bind() == {"FINISHED"}
 
 
+def test_a_sheared_armature_gets_a_cage_in_its_place(character: RigObjects) -> None:
+    holder = bpy.data.objects.new("Holder", None)
+    bpy.context.scene.collection.objects.link(holder)
+    holder.scale = (1.0, 3.0, 0.5)
+    character.armature.parent = holder
+    character.armature.rotation_euler = (0.4, 0.7, 0.3)
+    update()
+    cage = press()
+    assert all(encloses(cage, skin) for skin in character.skins)
+    assert bpy.ops.cage_rig.bind() == {"FINISHED"}
+
+
 def test_shape_keys_of_a_skin_stay_out_of_it(character: RigObjects) -> None:
     skin = character.skins[0]
     before = rest(press())
