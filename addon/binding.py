@@ -7,13 +7,51 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .adapters import coordinates, positions, snapshot
-from .session import Below, Known, Session, SkinSnapshot, Snapshot
+from .adapters import attributes, coordinates, positions, snapshot
+from .session import Below, Known, Session, SessionCrash, SessionError, SkinSnapshot, Snapshot
+
+# Kept with the posed cage's edit mesh: the rest cage (rig space) and the posed cage that belonged together when last
+# synced. Undo in Edit Mode restores that mesh alone; what it remembers brings the rest cage back, whatever the pose.
+MEMORY = ("cage_rig.rest", "cage_rig.posed")
+MARK = "cage_rig_bind"  # on a snapshot: which bind it is of
+
+
+class Damaged(SessionError):
+    """What the file keeps of a bind can't be used; the message is a sentence. A rebind makes it anew."""
+
+    fix = "rebind"
+
+    def __init__(self, fault: object) -> None:
+        super().__init__(f"what was kept of its bind can't be used ({fault}); undo, or press Rebind")
+
+
+def bound_anew(cage: bpy.types.Object) -> Session:
+    """A session made from what the file keeps. Raises `Damaged`."""
+    try:
+        return Session(read(cage))
+    except SessionCrash:
+        raise
+    except (SessionError, attributes.Damaged) as error:
+        raise Damaged(error) from error
+
+
+def mark(cage: bpy.types.Object) -> None:
+    """Let the snapshots name the bind that they are of."""
+    for owner in (cage.cage_rig, *cage.cage_rig.skins):
+        if owner.snapshot is not None and owner.snapshot.library is None:
+            owner.snapshot[MARK] = cage.cage_rig.bind_id
 
 
 def read(cage: bpy.types.Object) -> Snapshot:
-    """The bind of a rig, as arrays."""
+    """The bind of a rig, as arrays. Raises `attributes.Damaged`; what the numbers are is for the core to judge."""
     settings = cage.cage_rig
+    for owner in (settings, *settings.skins):
+        if owner.snapshot.get(MARK, settings.bind_id) != settings.bind_id:
+            raise attributes.Damaged(f"'{owner.snapshot.name}' is of another bind")
+    for name, matrix in [("cage", settings.cage_to_rig), *((s.snapshot.name, s.skin_to_rig) for s in settings.skins)]:
+        place = np.array(matrix, np.float64)
+        if not np.isfinite(place).all() or abs(np.linalg.det(place)) < 1e-30:
+            raise attributes.Damaged(f"the place of '{name}' is lost")
     parts = [
         SkinSnapshot(
             positions.read_base(skin.snapshot),

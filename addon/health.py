@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import layers, linked
+from . import layers, linked, migration
 from .adapters import armature, modifier, positions, stack
 
 
@@ -27,7 +27,7 @@ class Problem(str):
 def problem(cage: bpy.types.Object) -> str:
     """Why the rig can't run and what to do, as a `Problem` where a button can help, or an empty string."""
     settings = cage.cage_rig
-    if settings.version > 1:
+    if settings.version > migration.VERSION:
         return f"'{cage.name}' was bound with a newer Cage Rig; update the extension"
     posed = settings.posed_cage
     if posed is not None and posed.cage_rig.owner != cage:
@@ -69,6 +69,10 @@ def _in_use(obj: bpy.types.Object | None) -> bool:
     return obj is not None and len(obj.users_collection) > 0
 
 
+def _is_mesh(obj: bpy.types.Object | None) -> bool:
+    return obj is not None and obj.type == "MESH"
+
+
 def _name(obj: bpy.types.ID | None) -> str:
     return obj.name if obj is not None else "deleted"
 
@@ -103,7 +107,7 @@ def _cage_problem(cage: bpy.types.Object) -> str:
         return f"Cage '{cage.name}' was deleted; undo, or link it into a collection again"
     if settings.snapshot is None:
         return Problem(f"What was bound of '{cage.name}' is lost; press Rebind", "rebind")
-    if settings.posed_cage is None or not _in_use(settings.posed_cage):
+    if not _is_mesh(settings.posed_cage) or not _in_use(settings.posed_cage):
         sentence = f"The posed cage of '{cage.name}' was deleted; undo, or press Rebind to make a new one"
         return Problem(sentence, "rebind")
     for obj in (cage, settings.posed_cage):
@@ -122,6 +126,10 @@ def _skins_problem(cage: bpy.types.Object) -> str:
     if not skins:
         return Problem(f"All skins of '{cage.name}' were deleted; undo, or press Unbind", "unbind")
     for index, obj in skins:
+        if not _is_mesh(obj):
+            return Problem(
+                f"'{obj.name}', a skin of '{cage.name}', is no mesh any more; undo, or press Unbind", "unbind"
+            )
         snapshot = cage.cage_rig.skins[index].snapshot
         if snapshot is None:
             return Problem(f"What was bound of '{obj.name}' is lost; press Rebind", "rebind")
@@ -133,6 +141,11 @@ def _skins_problem(cage: bpy.types.Object) -> str:
             )
         if modifier.find(obj, cage) is None:
             return Problem(f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind", "rebind")
+        if not modifier.is_whole(obj):
+            return (
+                f"'{obj.name}' was bound with an older Cage Rig in another file; open and save that file, then reload "
+                "it here (Outliner, Blender File, Libraries)"
+            )
         blocking = stack.blocking(obj, stack.first(obj))
         if blocking:
             sentence = f"Modifier '{blocking}' of '{obj.name}' may change the vertices before Cage Rig; move it after"

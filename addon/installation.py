@@ -46,6 +46,7 @@ def install(context: bpy.types.Context, cage: bpy.types.Object, bound: Bound, se
         skin.skin_to_rig = bound.skin_to_rig[index].T.tolist()
         _join(skin.object, cage)
     binding.write_known(cage, bound.snapshot.known)
+    binding.mark(cage)
     settings.state = "PAUSED"  # a rig until the first update makes it live
     sync.start(cage, context.evaluated_depsgraph_get(), session)
 
@@ -77,9 +78,9 @@ def _make_posed_cage(context: bpy.types.Context, cage: bpy.types.Object, bound: 
     """The posed cage: a mesh of the cage's faces in rig space, parented to the armature."""
     settings = cage.cage_rig
     mesh = positions.new_mesh(f"{cage.name} Posed", bound.snapshot.cage, bound.snapshot.cage_faces)
-    positions.add_layers(mesh, sync.MEMORY)
+    positions.add_layers(mesh, binding.MEMORY)
     obj = settings.posed_cage
-    if obj is None:
+    if obj is None or obj.type != "MESH":
         obj = bpy.data.objects.new(mesh.name, mesh)
         obj.display_type, obj.show_in_front, obj.hide_render = "WIRE", True, True
         settings.posed_cage = obj

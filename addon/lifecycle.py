@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import binding, layers, props, reading, sync
-from .adapters import armature, positions, shape_keys, stack
+from . import binding, layers, migration, reading, sync
+from .adapters import armature, attributes, positions, shape_keys, stack
 from .installation import Bound, install, leave, remove_mesh, remove_object
 from .reading import BindError
 from .session import BindJob, Known, Session, SessionError, Snapshot
@@ -142,7 +142,7 @@ def _write_bind(
     if cage.cage_rig.state != "NONE":
         unbind(cage)  # a copy of a bound cage starts anew
     settings = cage.cage_rig
-    settings.version, settings.coordinates, settings.method = props.VERSION, source, bound.snapshot.method.upper()
+    settings.version, settings.coordinates, settings.method = migration.VERSION, source, bound.snapshot.method.upper()
     settings.armature, settings.input, skins = objects
     for obj in skins:
         settings.skins.add().object = obj
@@ -207,6 +207,7 @@ def use_coordinates(context: bpy.types.Context, cage: bpy.types.Object, known: K
         raise BindError(f"'{cage.name}' can't use these coordinates: {error}") from error
     binding.write_known(cage, known)
     settings.coordinates, settings.bind_id = source, uuid.uuid4().hex
+    binding.mark(cage)
     sync.start(cage, context.evaluated_depsgraph_get(), session)
 
 
@@ -215,10 +216,17 @@ def _same_rest(cage: bpy.types.Object, bound: Bound) -> bool:
     settings, now = cage.cage_rig, bound.snapshot
     if any(skin.snapshot is None for skin in settings.skins) or settings.snapshot is None:
         return False
-    then = binding.read(cage)
+    try:
+        then = binding.read(cage)
+    except attributes.Damaged:
+        return False
     pairs = [(then.cage, now.cage), (then.heads, now.heads), (then.parents, now.parents)]
     pairs += [(one.points, other.points) for one, other in zip(then.skins, now.skins, strict=False)]
-    same = len(then.skins) == len(now.skins) and [joint.name for joint in settings.joints] == bound.bone_names
+    same = (
+        then.known.is_finite
+        and len(then.skins) == len(now.skins)
+        and [joint.name for joint in settings.joints] == bound.bone_names
+    )
     return same and all(np.array_equal(one, other) for one, other in pairs)
 
 

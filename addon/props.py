@@ -20,7 +20,6 @@ from bpy.props import (
 
 from . import choosing, layers
 
-VERSION = 1
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
 # Numbers never move: they are what files store.
@@ -95,7 +94,7 @@ class CageRigSkin(bpy.types.PropertyGroup):
 class CageRigSettings(bpy.types.PropertyGroup):
     """Settings of the rig whose rest cage this object is, and marks on the objects that belong to a rig."""
 
-    version: IntProperty(default=0, override=OVERRIDABLE)
+    version: IntProperty(default=0, description="Of the form of what is kept; see migration", override=OVERRIDABLE)
     state: EnumProperty(items=STATES, name="State", default="NONE", override=OVERRIDABLE)
     message: StringProperty(name="Message", override=OVERRIDABLE)
     fix: StringProperty(name="Fix", description="What the panel's button does about the message", override=OVERRIDABLE)

@@ -84,7 +84,7 @@ def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
     for obj in objects:
         if obj is None:
             continue
-        found += [obj, obj.data]
+        found += [obj, obj.data] if obj.data is not None else [obj]
         keys = getattr(obj.data, "shape_keys", None)
         if keys is not None:
             found.append(keys)

@@ -27,6 +27,8 @@ Matrices = NDArray[np.float64]
 class SessionError(Exception):
     """The core refused an input; the message is its sentence. The session is as it was."""
 
+    fix = ""  # what a button can do about it
+
 
 class SessionCrash(SessionError):
     """The core failed in a way that is a bug; the session must be dropped."""
@@ -64,6 +66,11 @@ class Known:
     joint_coords: NDArray[np.float32] | None = None  # Ψ, #J by #C
     center_coords: NDArray[np.float32] | None = None  # Λ, #M by #C
     anchors: NDArray[np.int32] | None = None  # #C vertices (#M where there are fewer)
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether every number can be used."""
+        return all(np.isfinite(part).all() for part in vars(self).values() if part is not None)
 
 
 @dataclass(frozen=True)

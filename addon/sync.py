@@ -14,17 +14,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import binding, choosing, health, layers, linked, registry, skins
+from . import binding, choosing, health, layers, linked, migration, registry, skins
 from .adapters import armature, cage_keys, modifier, positions, shape_keys, stack
 from .session import Below, Session, SessionCrash, SessionError
 
 Points = NDArray[np.float32]
 Matrix = NDArray[np.float64]
-
-
-# Kept with the posed cage's edit mesh: the rest cage (rig space) and the posed cage that belonged together when last
-# synced. Undo in Edit Mode restores that mesh alone; what it remembers brings the rest cage back, whatever the pose.
-MEMORY = ("cage_rig.rest", "cage_rig.posed")
 
 
 class Event(enum.Enum):
@@ -159,7 +154,7 @@ def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event)
     except SessionError as error:
         if isinstance(error, SessionCrash):
             _running.pop(cage.session_uid, None)
-        _pause(cage, f"'{cage.name}': {error}")
+        _pause(cage, health.Problem(f"'{cage.name}': {error}", error.fix))
     except Exception as error:  # a handler must never raise, whatever the file holds
         _pause(cage, f"'{cage.name}' met an error in Cage Rig ({type(error).__name__}: {error}); please report it")
     finally:
@@ -169,6 +164,9 @@ def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event)
 def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
     if cage.library is not None and not cage.evaluated_get(depsgraph).is_evaluated:
         return  # what a library override was made from
+    running = _running.get(cage.session_uid)
+    if running is None or cage.cage_rig.state == "PAUSED":
+        migration.migrate(cage)
     if linked.adopt(cage):
         registry.forget()
     for obj in layers.skins_of(cage):
@@ -180,9 +178,8 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     source, bones = cage.evaluated_get(depsgraph), cage.cage_rig.armature.evaluated_get(depsgraph)
     if not (source.is_evaluated and bones.is_evaluated):
         return  # in no view of this depsgraph: nothing of it is shown
-    running = _running.get(cage.session_uid)
     if running is None or running.bind_id != cage.cage_rig.bind_id:  # an undo may bring back another bind
-        running = _running[cage.session_uid] = _Running(Session(binding.read(cage)), cage.cage_rig.bind_id)
+        running = _running[cage.session_uid] = _Running(binding.bound_anew(cage), cage.cage_rig.bind_id)
         event = Event.RESTORED
     if event is Event.RESTORED:
         running.written.clear()
@@ -213,7 +210,7 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     rest_changed = not _is_known(running, rest)
     posed = _read_posed_cage(settings.posed_cage)
     if event is Event.RESTORED and settings.posed_cage.data.is_editmode:
-        memory = positions.read_edit_layers(settings.posed_cage.data, MEMORY)
+        memory = positions.read_edit_layers(settings.posed_cage.data, binding.MEMORY)
         if memory is not None:
             running.cage, running.posed = rest, posed
             session.play(memory[0], transforms, rest_joints, influence)
@@ -398,7 +395,7 @@ def _remember(running: _Running, posed: bpy.types.Object) -> None:
     rest = running.cage if running.cage_wanted is None else running.cage_wanted
     memory = rest.tobytes() + running.posed.tobytes()
     if memory != running.memory:
-        positions.write_edit_layers(posed.data, dict(zip(MEMORY, (rest, running.posed), strict=True)))
+        positions.write_edit_layers(posed.data, dict(zip(binding.MEMORY, (rest, running.posed), strict=True)))
         running.memory = memory
 
 

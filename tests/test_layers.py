@@ -23,19 +23,20 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "layers": ({"bpy"}, {"adapters"}),
     "linked": ({"bpy"}, {"adapters"}),
     "registry": ({"bpy"}, {"adapters", "layers"}),
-    "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked"}),
+    "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked", "migration"}),
+    "migration": ({"bpy"}, {"adapters", "binding", "layers"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
     "sync": (
         {"bpy", "numpy"},
-        {"adapters", "binding", "choosing", "health", "layers", "linked", "registry", "session", "skins"},
+        {"adapters", "binding", "choosing", "health", "layers", "linked", "migration", "registry", "session", "skins"},
     ),
     "generator": ({"cage_rig_core", "numpy"}, set()),
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "installation": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "session", "sync"}),
     "lifecycle": (
         {"bpy", "numpy"},
-        {"adapters", "binding", "installation", "layers", "props", "reading", "session", "sync"},
+        {"adapters", "binding", "installation", "layers", "migration", "reading", "session", "sync"},
     ),
     "bake": (
         {"bpy", "mathutils", "numpy", "pathlib", "shutil", "struct"},

@@ -11,6 +11,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from . import attributes
+
 WIDTH = 16  # numbers in an attribute
 
 
@@ -24,19 +26,15 @@ def write(mesh: bpy.types.Mesh, name: str, rows: NDArray[np.floating] | None) ->
         part = rows[:, start : start + WIDTH]
         block = np.zeros((len(rows), WIDTH), np.float32)
         block[:, : part.shape[1]] = part
-        mesh.attributes.new(f"{name}.{start}", "FLOAT4X4", "POINT").data.foreach_set("value", block.ravel())
+        attributes.write(mesh, f"{name}.{start}", "FLOAT4X4", block)
 
 
 def read(mesh: bpy.types.Mesh, name: str, columns: int) -> NDArray[np.float32] | None:
-    """What `write` kept, `#V by columns`, or None where nothing is kept by this name."""
-    if f"{name}.0" not in mesh.attributes:
+    """What `write` kept, `#V by columns`, or None where nothing is kept by this name. Raises `attributes.Damaged`."""
+    if not attributes.count(mesh, f"{name}."):
         return None
-    rows = np.empty((len(mesh.vertices), columns), np.float32)
-    block = np.empty((len(rows), WIDTH), np.float32)
-    for start in range(0, columns, WIDTH):
-        mesh.attributes[f"{name}.{start}"].data.foreach_get("value", block.ravel())
-        rows[:, start : start + WIDTH] = block[:, : columns - start]
-    return rows
+    blocks = [attributes.read(mesh, f"{name}.{start}", "FLOAT4X4") for start in range(0, columns, WIDTH)]
+    return np.ascontiguousarray(np.concatenate(blocks, axis=1)[:, :columns])
 
 
 def write_indices(mesh: bpy.types.Mesh, name: str, indices: NDArray[np.integer] | None) -> None:
@@ -46,13 +44,12 @@ def write_indices(mesh: bpy.types.Mesh, name: str, indices: NDArray[np.integer] 
     if indices is not None:
         padded = np.full(len(mesh.vertices), -1, np.int32)
         padded[: len(indices)] = indices
-        mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", padded)
+        attributes.write(mesh, name, "INT", padded)
 
 
 def read_indices(mesh: bpy.types.Mesh, name: str) -> NDArray[np.int32] | None:
-    """What `write_indices` kept, or None."""
+    """What `write_indices` kept, or None. Raises `attributes.Damaged`."""
     if name not in mesh.attributes:
         return None
-    indices = np.empty(len(mesh.vertices), np.int32)
-    mesh.attributes[name].data.foreach_get("value", indices)
+    indices = attributes.read(mesh, name, "INT")
     return indices[indices >= 0]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .. import compat
 from . import positions
-from .node_group import ATTRIBUTE, INDEX, INPUT, NAME, identifier, node_group
+from .node_group import ATTRIBUTE, INDEX, INPUT, NAME, SOCKETS, identifier, is_current, node_group
 from .positions import Points
 
 
@@ -24,14 +24,20 @@ def ours(skin: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [m for m in skin.modifiers if m.type == "NODES" and m.node_group and m.node_group.get("cage_rig")]
 
 
+def is_emptied(modifier: bpy.types.Modifier) -> bool:
+    """Whether the node group of a modifier was deleted, so that it does nothing."""
+    return modifier.type == "NODES" and modifier.node_group is None
+
+
 def find(skin: bpy.types.Object, cage: bpy.types.Object) -> bpy.types.Modifier | None:
     """The skin's modifier of the rig of this cage, or None."""
     return next((modifier for modifier in ours(skin) if read(modifier, "Rest Cage") == cage), None)
 
 
 def read(modifier: bpy.types.Modifier, name: str) -> Any:
-    """The value of an input of our modifier; see `node_group.SOCKETS`."""
-    return compat.modifier_input(modifier, identifier(modifier.node_group, name))
+    """The value of an input of our modifier; see `node_group.SOCKETS`. None where the group has no such input."""
+    found = identifier(modifier.node_group, name)
+    return None if found is None else compat.modifier_input(modifier, found)
 
 
 def set_inputs(modifier: bpy.types.Modifier, values: dict[str, Any]) -> bool:
@@ -45,12 +51,36 @@ def set_inputs(modifier: bpy.types.Modifier, values: dict[str, Any]) -> bool:
 
 
 def add(skin: bpy.types.Object, rest_cage: bpy.types.Object, posed_cage: bpy.types.Object, index: int) -> None:
-    """Add the modifier of a rig to the skin at place `index` of its stack, without a feed."""
+    """Add the modifier of a rig to the skin at place `index` of its stack, without a feed.
+
+    It takes the place of one of ours whose node group was deleted.
+    """
+    for emptied in [found for found in skin.modifiers if is_emptied(found) and found.name.startswith(NAME)]:
+        index -= list(skin.modifiers).index(emptied) < index
+        skin.modifiers.remove(emptied)
     modifier = skin.modifiers.new(NAME, "NODES")
     modifier.node_group = node_group()
     modifier.show_in_editmode = False  # there the base mesh is edited, and the feed can't be written
     set_inputs(modifier, {"Rest Cage": rest_cage, "Posed Cage": posed_cage})
     skin.modifiers.move(len(skin.modifiers) - 1, index)
+
+
+def renew(skin: bpy.types.Object) -> None:
+    """Give modifiers of ours whose node group lacks inputs a whole one, with the values that they have."""
+    for modifier in ours(skin):
+        group = modifier.node_group
+        if not is_current(group):
+            values = {name: read(modifier, name) for name in SOCKETS if read(modifier, name) is not None}
+            modifier.node_group = node_group()
+            modifier.show_in_editmode = False
+            set_inputs(modifier, values)
+            if group.users == 0 and group.library is None:
+                bpy.data.node_groups.remove(group)
+
+
+def is_whole(skin: bpy.types.Object) -> bool:
+    """Whether the node groups of our modifiers have all inputs."""
+    return all(is_current(modifier.node_group) for modifier in ours(skin))
 
 
 def lead(skin: bpy.types.Object, cage: bpy.types.Object) -> None:

@@ -9,6 +9,8 @@ cage as inputs so that Blender evaluates them, also where they are hidden.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 
 NAME = "Cage Rig"
@@ -32,7 +34,7 @@ SOCKETS = {
 def node_group() -> bpy.types.NodeTree:
     """The shared node group of this file, made on first use."""
     for group in bpy.data.node_groups:
-        if group.get("cage_rig") and group.library is None:
+        if group.get("cage_rig") and group.library is None and is_current(group):
             return group
     group = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
     group["cage_rig"] = True
@@ -45,13 +47,21 @@ def node_group() -> bpy.types.NodeTree:
     return group
 
 
-def identifier(group: bpy.types.NodeTree, name: str) -> str:
-    """The identifier of an input of the group, by which a modifier holds its value."""
-    return next(
-        item.identifier
-        for item in group.interface.items_tree
-        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
-    )
+def is_current(group: bpy.types.NodeTree) -> bool:
+    """Whether a group of ours has all inputs: an earlier Cage Rig made it with fewer, or somebody took some away."""
+    return {name: kind for name, _, kind in _inputs(group) if name in SOCKETS} == SOCKETS
+
+
+def identifier(group: bpy.types.NodeTree, name: str) -> str | None:
+    """The identifier of an input of the group, by which a modifier holds its value; None where it has none."""
+    return next((found for socket, found, _ in _inputs(group) if socket == name), None)
+
+
+def _inputs(group: bpy.types.NodeTree) -> Iterator[tuple[str, str, str]]:
+    """Name, identifier and type of each input."""
+    for item in group.interface.items_tree:
+        if item.item_type == "SOCKET" and item.in_out == "INPUT":
+            yield item.name, item.identifier, item.socket_type
 
 
 def _socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:

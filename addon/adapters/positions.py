@@ -41,8 +41,8 @@ def write_edit_mesh(mesh: bpy.types.Mesh, points: Points) -> None:
 
 
 def add_layers(mesh: bpy.types.Mesh, names: tuple[str, ...]) -> None:
-    """Add point attributes that `write_edit_layers` can fill in Edit Mode. Not in Edit Mode."""
-    for name in names:
+    """Add point attributes that `write_edit_layers` can fill in Edit Mode, where they are missing. Not in Edit Mode."""
+    for name in set(names) - set(mesh.attributes.keys()):
         mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
 
 

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import positions
+from . import attributes, positions
 
 Csr = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
@@ -40,24 +40,17 @@ def _write_weights(
         values = np.zeros(len(counts), np.float32)
         joints[row[at]] = indices[at]
         values[row[at]] = data[at]
-        mesh.attributes.new(f"joint_{k}", "INT", "POINT").data.foreach_set("value", joints)
-        mesh.attributes.new(f"weight_{k}", "FLOAT", "POINT").data.foreach_set("value", values)
+        attributes.write(mesh, f"joint_{k}", "INT", joints)
+        attributes.write(mesh, f"weight_{k}", "FLOAT", values)
 
 
 def read_weights(mesh: bpy.types.Mesh) -> Csr:
-    """CSR weights (indptr `#V + 1`, bone indices, values) of a skin's snapshot."""
-    count = len(mesh.vertices)
-    columns: list[NDArray[np.int32]] = []
-    values: list[NDArray[np.float32]] = []
-    while f"joint_{len(columns)}" in mesh.attributes:
-        joints, weights = np.empty(count, np.int32), np.empty(count, np.float32)
-        mesh.attributes[f"joint_{len(columns)}"].data.foreach_get("value", joints)
-        mesh.attributes[f"weight_{len(columns)}"].data.foreach_get("value", weights)
-        columns.append(joints)
-        values.append(weights)
-    if not columns:
-        return np.zeros(count + 1, np.int64), np.empty(0, np.int64), np.empty(0, np.float64)
-    joint_table, weight_table = np.stack(columns, 1), np.stack(values, 1)
+    """CSR weights (indptr `#V + 1`, bone indices, values) of a skin's snapshot. Raises `attributes.Damaged`."""
+    slots = max(attributes.count(mesh, "joint_"), attributes.count(mesh, "weight_"))
+    if not slots:
+        raise attributes.Damaged(f"'{mesh.name}' has lost its weights")
+    joint_table = np.stack([attributes.read(mesh, f"joint_{k}", "INT") for k in range(slots)], 1)
+    weight_table = np.stack([attributes.read(mesh, f"weight_{k}", "FLOAT") for k in range(slots)], 1)
     used = joint_table >= 0
     indptr = np.concatenate([[0], np.cumsum(used.sum(1))]).astype(np.int64)
     return indptr, joint_table[used].astype(np.int64), weight_table[used].astype(np.float64)

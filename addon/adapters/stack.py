@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from .modifier import ours, read, remove
+from .modifier import is_emptied, ours, read, remove
 
 # Modifiers that touch no vertex.
 HARMLESS = {
@@ -84,7 +84,8 @@ def first(skin: bpy.types.Object) -> int:
 
 
 def _shown_before(skin: bpy.types.Object, index: int) -> list[bpy.types.Modifier]:
-    return [m for m in list(skin.modifiers)[:index] if (m.show_viewport or m.show_render) and m.type not in HARMLESS]
+    shown = [m for m in list(skin.modifiers)[:index] if m.show_viewport or m.show_render]
+    return [m for m in shown if m.type not in HARMLESS and not is_emptied(m)]
 
 
 def blocking(skin: bpy.types.Object, index: int) -> str | None:
