@@ -7,8 +7,10 @@ import json
 import re
 import subprocess
 import tomllib
+import zipfile
 from pathlib import Path
 
+import build_core
 import check_version
 import pytest
 import yaml
@@ -90,3 +92,34 @@ def test_the_manifest_asks_for_files_only() -> None:
     manifest = tomllib.loads((ROOT / "addon/blender_manifest.toml").read_text())
     assert set(manifest["permissions"]) == {"files"}, "nothing of it is online"
     assert manifest["license"] == ["SPDX:GPL-3.0-or-later"] and len(manifest["tagline"]) <= 64
+
+
+def test_a_wheel_forgets_where_it_was_built(tmp_path: Path) -> None:
+    """And is the same file wherever that was, with a record that fits."""
+    made = []
+    for folder in ("/home/one", "/somewhere/else"):
+        text = f'{{"bom-ref": "path+file://{folder}/rust_core/cage_rig#0.1.0"}}'.encode()
+        wheel = tmp_path / f"{len(made)}.whl"
+        with zipfile.ZipFile(wheel, "w") as archive:
+            for name, content in (
+                ("x/__init__.py", b"pass"),
+                ("x.dist-info/sboms/x.json", text),
+                ("x.dist-info/RECORD", build_core._record("x.dist-info/sboms/x.json", text) + b"\n"),
+            ):
+                archive.writestr(zipfile.ZipInfo(name), content)
+        build_core.forget_folder(wheel, Path(folder))
+        made.append(wheel.read_bytes())
+        found = zipfile.ZipFile(wheel)
+        assert folder.encode() not in found.read("x.dist-info/sboms/x.json")
+        line = build_core._record("x.dist-info/sboms/x.json", found.read("x.dist-info/sboms/x.json"))
+        assert line in found.read("x.dist-info/RECORD")
+    assert made[0] == made[1]
+
+
+def test_the_python_package_has_all_that_an_index_shows() -> None:
+    folder = ROOT / "rust_core/cage_rig_py"
+    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
+    assert {"description", "readme", "license", "license-files", "authors", "keywords", "classifiers"} <= set(project)
+    assert all((folder / name).exists() for name in [project["readme"], *project["license-files"], "cage_rig_core.pyi"])
+    assert "Typing :: Typed" in project["classifiers"]
+    assert not any(line.startswith("License ::") for line in project["classifiers"]), "the expression says it"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import base64
+import hashlib
 import os
 import subprocess
 import sys
@@ -51,6 +53,7 @@ def main() -> None:
     else:
         build(args.out, ["--zig", *_linux("linux")] if sys.platform == "linux" else [])
     for wheel in sorted(args.out.glob("cage_rig_core-*.whl")):
+        forget_folder(wheel)
         check(wheel)
         print(f"{wheel}  {wheel.stat().st_size / 1e6:.2f} MB")
 
@@ -84,6 +87,30 @@ def build(out: Path, arguments: list[str]) -> None:
         f"--remap-path-prefix={Path.home()}=/home".strip(),
     }
     subprocess.run(command, check=True, env={**os.environ, **reproducible, "PATH": path})
+
+
+def forget_folder(wheel: Path, folder: Path = ROOT) -> None:
+    """Take the folder that a wheel was built in out of its list of crates (SBOM), where maturin names it."""
+    with zipfile.ZipFile(wheel) as source:
+        entries = {info: source.read(info) for info in source.infolist()}
+    (record,) = (info for info in entries if info.filename.endswith(".dist-info/RECORD"))
+    for info in [info for info in entries if "/sboms/" in info.filename]:
+        text = entries[info].replace(folder.as_uri().encode(), b"file:///cage-rig")
+        old, new = (_record(info.filename, part) for part in (entries[info], text))
+        if old not in entries[record]:
+            sys.exit(f"build_core: {wheel.name} has no record of its {info.filename}")
+        entries[info], entries[record] = text, entries[record].replace(old, new)
+    draft = wheel.with_suffix(".partial")
+    with zipfile.ZipFile(draft, "w") as made:
+        for info, content in entries.items():
+            made.writestr(info, content, compress_type=info.compress_type, compresslevel=9)
+    draft.replace(wheel)
+
+
+def _record(name: str, content: bytes) -> bytes:
+    """A file's line in a wheel's RECORD."""
+    digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+    return f"{name},sha256={digest},{len(content)}".encode()
 
 
 def platform_of(wheel: Path) -> Platform:
