@@ -90,7 +90,7 @@ def make(
     editing = edit(found, options, nodes)
     try:
         job = found.generator.start(editing.bending)
-        while not job.wait(0.5):
+        while not job.wait(0.1):
             if watch is not None:
                 watch(job)
         return finish(context, job, found, options, editing.nodes, cage=cage, tell=tell)

@@ -73,7 +73,10 @@ def explained(refusal: Refusal, scene: Scene) -> GenerateError:
 def _of_skin(refusal: Refusal, scene: Scene) -> GenerateError:
     assert refusal.place is not None
     obj = scene.nearest_skin(refusal.place)
-    text = f"'{obj.name}' can't be caged: {refusal}. Cage Repaired Hull takes its voxel-remeshed hull instead"
+    text = (
+        f"'{obj.name}' can't be caged: {refusal}. "
+        "Cage Repaired Hull cages a voxel-remeshed copy and leaves the skin as it is"
+    )
     error = GenerateError(text, repairable=True, place=refusal.place)
     broken = picks.broken_vertices(scene.points, scene.faces)
     near = np.linalg.norm(scene.points - refusal.place, axis=1)

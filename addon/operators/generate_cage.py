@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from .. import caging, lifecycle, props, selection
 from ..caging import current
-from . import node_events
+from . import node_events, waiting
 
 # Numbers never move: they are what keymaps and presets store.
 PLACEMENTS = [
@@ -92,7 +92,17 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
         try:
             cage, armature, skins = self._chosen(context)
             nodes = self._own_nodes()
-            caging.make(context, skins, armature, self._options(), nodes, cage=cage, tell=self._tell)
+            with waiting.at_cursor(context) as show:
+                caging.make(
+                    context,
+                    skins,
+                    armature,
+                    self._options(),
+                    nodes,
+                    cage=cage,
+                    tell=self._tell,
+                    watch=lambda job: show(job.share),
+                )
         except (caging.GenerateError, lifecycle.BindError) as error:
             return self._refuse(error)
         return {"FINISHED"}

@@ -6,7 +6,8 @@ Operators that take long are modal, driven by a timer. Nothing but views can be 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Protocol
 
 import bpy
@@ -72,6 +73,20 @@ class Wait:
         """Take the work back and give the window back."""
         self.end()
         self._give_up()
+
+
+@contextmanager
+def at_cursor(context: bpy.types.Context) -> Iterator[Callable[[float], object]]:
+    """For work that holds the window, as what the panel Adjust Last Operation repeats does: the mouse cursor counts.
+
+    Gives what is told the share that is done. Esc is not heard meanwhile.
+    """
+    manager = context.window_manager
+    manager.progress_begin(0.0, 100.0)
+    try:
+        yield lambda share: manager.progress_update(100.0 * share)
+    finally:
+        manager.progress_end()
 
 
 def show_status(window: bpy.types.Window, draw: Callable[[bpy.types.Header, bpy.types.Context], None] | None) -> None:

@@ -37,7 +37,7 @@ def test_neighbours_meet_only_where_they_overlap():
 
 
 def test_the_distance_is_that_of_the_nearest_points():
-    above = UPRIGHT + [0.1, 0.1, 0.25]
+    above = UPRIGHT + np.array([0.1, 0.1, 0.25])
     assert exact.nearer(UPRIGHT, ONE, above, ONE, 1.0) == pytest.approx(0.25)
     crossed = np.array([[0.5, -0.5, 0.1], [0.5, -2, 0.1], [0.5, -1, 3]])
     assert exact.nearer(UPRIGHT, ONE, crossed, ONE, 1.0) == pytest.approx(np.hypot(0.5, 0.1))

@@ -81,7 +81,7 @@ def words(context: bpy.types.Context, lines: list[str], *, alarm: bool) -> None:
     blf.size(FONT, TEXT * unit)
     width = max(_length(line) for line in lines) + 2 * PAD * unit
     step = (TEXT + GAP) * unit
-    x, y = left + MARGIN * unit, MARGIN * unit
+    x, y = left + MARGIN * unit, _above_adjust(context) + MARGIN * unit
     _rectangle(x, y, width, len(lines) * step + 2 * PAD * unit - GAP * unit, BACK)
     for row, line in enumerate(reversed(lines)):
         blf.color(FONT, *(ALARM if alarm and row < len(lines) - 1 else (0.93, 0.93, 0.93)), 1.0)
@@ -91,6 +91,12 @@ def words(context: bpy.types.Context, lines: list[str], *, alarm: bool) -> None:
 def _on_the_left(context: bpy.types.Context) -> list[bpy.types.Region]:
     """Regions that lie over the view's left side."""
     return [other for other in context.area.regions if other.type == "TOOLS" and other.width > 1]
+
+
+def _above_adjust(context: bpy.types.Context) -> float:
+    """The height over the panel Adjust Last Operation, where it is shown."""
+    panels = [other for other in context.area.regions if other.type == "HUD" and other.height > 1]
+    return max((other.y - context.region.y + other.height for other in panels), default=0)
 
 
 def _draw_text(text: str, right: float, bottom: float, unit: float) -> float:
