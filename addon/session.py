@@ -110,6 +110,7 @@ class Session:
         self.influence = 1.0
         self.revision = 0  # grows whenever a result may have changed
         self._links = _tail_links(snapshot)
+        self._lengths = np.maximum(np.linalg.norm(snapshot.tails - snapshot.heads, axis=1), 1e-12)
         self._buffers = [np.empty((count, 3), np.float32) for count in counts]
         self._offsets: list[Points | None] = [None] * len(skins)
         self._lower: list[Points | None] = [None] * len(skins)  # what the rig below moves the skins by
@@ -327,9 +328,8 @@ class Session:
         if len(self._links):
             bone, child = self._links.T
             along = rest[bone, :3, 1]
-            length = np.linalg.norm(self.snapshot.tails[bone] - self.snapshot.heads[bone], axis=1)
-            reach = np.einsum("ij,ij->i", joints[child] - joints[bone], along) / np.maximum(length, 1e-12)
-            moved[bone, :3, 1] *= np.clip(reach, 0.05, None)[:, None]
+            reach = ((joints[child] - joints[bone]) * along).sum(axis=1) / self._lengths[bone]
+            moved[bone, :3, 1] *= np.maximum(reach, 0.05)[:, None]
         return self.rig.transforms @ moved
 
 

@@ -24,6 +24,33 @@ _UNREADABLE = (
 )
 
 
+@dataclass(frozen=True)
+class Place:
+    """Where a skin is in the armature's space, and the world matrices that say so."""
+
+    bones: object
+    skin: object
+    matrix: Matrix  # from the skin's space to the armature's
+    still: bool  # it is that of the bind
+    inverse: Matrix | None  # of `matrix`; None: it changes nothing
+    key: bytes
+
+
+Places = dict[int, Place]
+
+
+def place(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph, known: Places) -> Place:
+    """Where skin `index` is now; taken from `known`, and kept there, while neither object moves."""
+    bones = cage.cage_rig.armature.evaluated_get(depsgraph).matrix_world
+    skin = cage.cage_rig.skins[index].object.evaluated_get(depsgraph).matrix_world
+    found = known.get(index)
+    if found is None or found.bones != bones or found.skin != skin:
+        matrix, still = to_rig(cage, index, depsgraph)
+        inverse = None if np.array_equal(matrix, np.eye(4)) else np.linalg.inv(matrix)
+        found = known[index] = Place(bones.copy(), skin.copy(), matrix, still, inverse, matrix.tobytes())
+    return found
+
+
 def to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, bool]:
     """Matrix from skin `index` to the armature's space now, and whether it is still that of the bind."""
     skin = cage.cage_rig.skins[index]
@@ -42,6 +69,18 @@ class RestShape:
     offsets: list[Points | None]  # #M by 3 in rig space
     masks: list[Mask | None]  # #M
     complete: bool = True  # False: a part can only be read from the next evaluation on
+
+
+def read_plain(cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, known: Places) -> RestShape:
+    """`read` where no mask and no modifier before ours is at work on any skin."""
+    found = RestShape(session.offsets, session.masks)
+    for index, skin in enumerate(cage.cage_rig.skins):
+        if not skin.object.data.is_editmode:
+            at = place(cage, index, depsgraph, known)
+            rest = session.snapshot.skins[index].points
+            bound = None if at.still else np.array(skin.skin_to_rig, np.float64)
+            found.offsets[index] = _without_modifiers(skin.object, depsgraph, rest, at.matrix, bound)
+    return found
 
 
 def read(cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, *, readable: bool) -> RestShape:
@@ -123,21 +162,28 @@ def _without_modifiers(
     return offset
 
 
-def write(cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, written: Written) -> None:
-    """Feed posed points to the skins that this rig places and whose result changed since `written`.
+def write(
+    skins: list[tuple[int, bpy.types.Object]],
+    cage: bpy.types.Object,
+    session: Session,
+    depsgraph: bpy.types.Depsgraph,
+    written: Written,
+    known: Places,
+) -> None:
+    """Feed posed points to those of the `skins` that this rig places and whose result changed since `written`.
 
     A skin in Edit Mode waits.
     """
-    for index, obj in health.live_skins(cage):
+    for index, obj in skins:
         if obj.data.is_editmode or obj.cage_rig.owner != cage:
             written.pop(index, None)
             continue
-        matrix, _ = to_rig(cage, index, depsgraph)
-        state = (session.revision, matrix.tobytes())
+        at = place(cage, index, depsgraph, known)
+        state = (session.revision, at.key)
         if written.get(index) == state and modifier.is_fed(obj):
             continue
         points = session.posed_skin(index)
-        if not np.array_equal(matrix, np.eye(4)):
-            points = positions.apply_matrix(np.linalg.inv(matrix), points)
+        if at.inverse is not None:
+            points = positions.apply_matrix(at.inverse, points)
         modifier.write(obj, points)
         written[index] = state

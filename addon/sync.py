@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import binding, choosing, health, layers, linked, migration, registry, skins
+from . import binding, choosing, glance, health, layers, linked, migration, registry, skins
 from .adapters import armature, cage_keys, modifier, positions, shape_keys, stack
 from .session import Below, Session, SessionCrash, SessionError
 
@@ -39,9 +39,12 @@ class _Running:
     cage: Points | None = None  # rest cage, rig space, as last read
     cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
     posed: Points | None = None  # posed cage as last read or written
+    stale: bool = False  # the posed cage's mesh is not that of this pose: it was hidden
     memory: bytes = b""  # what the edit mesh of the posed cage remembers
-    refit_rest: Matrix | None = None
-    bone_inverse: tuple[bytes, Matrix] | None = None  # rest matrices and their inverses
+    refit_rest: tuple[Matrix, Matrix] | None = None  # of the refit bones, and its inverse
+    bones: glance.Bones | None = None  # as last read
+    seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
+    places: skins.Places = field(default_factory=dict)
     written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
 
 
@@ -50,12 +53,14 @@ _busy = False
 _restoring = False
 _rendering = False
 _again: set[registry.Key] = set()  # rest cages whose rigs need one more update
+_stale: set[registry.Key] = set()  # rest cages whose posed cages are hidden and not fitted
 
 
 def forget() -> None:
     """Drop every session: after loading a file, and when the add-on goes."""
     _running.clear()
     _again.clear()
+    _stale.clear()
     choosing.forget()
     registry.forget()
 
@@ -73,8 +78,9 @@ def edited(depsgraph: bpy.types.Depsgraph) -> None:
         return
     event = Event.RESTORED if _restoring else Event.EDIT
     cages = registry.touched(depsgraph)
-    if _again:
-        cages = [cage for cage in registry.rigs() if registry.key_of(cage) in _again or cage in cages]
+    due = _again | {key for key in _stale if _is_back(key)}
+    if due:
+        cages = [cage for cage in registry.rigs() if registry.key_of(cage) in due or cage in cages]
     _again.clear()
     for cage in cages:
         update(cage, depsgraph, event)
@@ -85,6 +91,9 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     if _rendering and depsgraph.mode == "VIEWPORT":
         return
     _again.clear()
+    if any(isinstance(change.id, bpy.types.Armature) for change in depsgraph.updates):
+        for running in _running.values():
+            running.seen = None  # bones may be other ones
     for cage in registry.rigs():
         update(cage, depsgraph, Event.FRAME)
 
@@ -162,18 +171,10 @@ def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event)
 
 
 def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
-    if cage.library is not None and not cage.evaluated_get(depsgraph).is_evaluated:
-        return  # what a library override was made from
     running = _running.get(cage.session_uid)
-    if running is None or cage.cage_rig.state == "PAUSED":
-        migration.migrate(cage)
-    if linked.adopt(cage):
-        registry.forget()
-    for obj in layers.skins_of(cage):
-        layers.settle(obj)
-    trouble = health.problem(cage)
-    if trouble:
-        _pause(cage, trouble)
+    known = running is not None and event is Event.FRAME and running.seen is not None
+    known = known and running.seen == glance.seen(cage)
+    if not known and not _look_closely(cage, depsgraph):
         return
     source, bones = cage.evaluated_get(depsgraph), cage.cage_rig.armature.evaluated_get(depsgraph)
     if not (source.is_evaluated and bones.is_evaluated):
@@ -184,16 +185,41 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     if event is Event.RESTORED:
         running.written.clear()
         running.cage_wanted, running.memory = None, b""
+    if not known:
+        running.seen = None
     note = _advance(cage, running, depsgraph, event)
     _write_back(cage, running, depsgraph)
-    _resume(cage, note)
+    if not known:
+        _resume(cage, note)
+        running.seen = glance.seen(cage) if glance.is_plain(cage) else None
+    elif cage.cage_rig.message:
+        _resume(cage, note)
+
+
+def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether the rig can run; where it can't it is paused, or nobody sees it."""
+    if cage.library is not None and not cage.evaluated_get(depsgraph).is_evaluated:
+        return False  # what a library override was made from
+    if cage.session_uid not in _running or cage.cage_rig.state == "PAUSED":
+        migration.migrate(cage)
+    if linked.adopt(cage):
+        registry.forget()
+    for obj in layers.skins_of(cage):
+        layers.settle(obj)
+    trouble = health.problem(cage)
+    if trouble:
+        _pause(cage, trouble)
+    return not trouble
 
 
 def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:
     """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
     session, settings = running.session, cage.cage_rig
     session.stand_on(_below(cage))
-    shape = skins.read(cage, session, depsgraph, readable=registry.key_of(cage) not in _again)
+    if running.seen is not None:
+        shape = skins.read_plain(cage, session, depsgraph, running.places)
+    else:
+        shape = skins.read(cage, session, depsgraph, readable=registry.key_of(cage) not in _again)
     session.offset_skins(shape.offsets)
     session.mask_skins(shape.masks)
     if not shape.complete:
@@ -221,7 +247,9 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
         running.cage, running.cage_wanted = rest, None
     known = running.cage if running.cage_wanted is None else running.cage_wanted
     session.play(known, transforms, rest_joints, influence)
-    running.posed = posed
+    before, running.posed = running.posed, posed
+    if is_edit and running.stale and before is not None:
+        posed = session.posed_cage() + (posed - before)  # made on the shape of another pose
     return _take_posed_edit(cage, running, posed) if is_edit else ""
 
 
@@ -242,9 +270,9 @@ def _recall(cage: bpy.types.Object, running: _Running, rest: Points, posed: Poin
     move is made again.
     """
     move = running.posed - posed
-    if np.abs(move).max() > 1e-6 * running.session.size:
+    if not positions.close(running.posed, posed, 1e-6 * running.session.size):
         return _take_posed_edit(cage, running, running.session.posed_cage() + move)
-    if not np.allclose(rest, running.cage, rtol=0.0, atol=1e-6 * running.session.size):
+    if not positions.close(rest, running.cage, 1e-6 * running.session.size):
         try:
             _move_rest_cage(cage, running.cage, rest)
         except shape_keys.KeyRefusal as error:
@@ -257,7 +285,7 @@ def _recall(cage: bpy.types.Object, running: _Running, rest: Points, posed: Poin
 def _is_known(running: _Running, rest: Points) -> bool:
     """Whether the rest cage is the one of the last update, or the one that an edit of the posed cage wrote."""
     if running.cage_wanted is not None:
-        return np.allclose(rest, running.cage_wanted, rtol=0.0, atol=1e-6 * running.session.size)
+        return positions.close(rest, running.cage_wanted, 1e-6 * running.session.size)
     return running.cage is not None and np.array_equal(rest, running.cage)
 
 
@@ -280,7 +308,7 @@ def _posed_is_edit(cage: bpy.types.Object, event: Event, rest_changed: bool) -> 
 
 def _take_posed_edit(cage: bpy.types.Object, running: _Running, posed: Points) -> str:
     """The artist moved the posed cage: move the rest cage so that it goes there, or say why that can't be."""
-    if np.allclose(posed, running.session.posed_cage(), rtol=0.0, atol=1e-6 * running.session.size):
+    if positions.close(posed, running.session.posed_cage(), 1e-6 * running.session.size):
         return ""
     keyed = not cage.data.is_editmode and cage_keys.takes_edits(cage)
     try:
@@ -344,15 +372,17 @@ def _read_posed_cage(posed: bpy.types.Object) -> Points:
 def _read_pose(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, Matrix]:
     """Transforms T (`#J by 4 by 4`) of the evaluated pose, and the rest joints (`#J by 3`) they are measured at."""
     obj = cage.cage_rig.armature.evaluated_get(depsgraph)
-    rest_order, pose_order = health.bone_order(cage)
-    rest = armature.read_rest_matrices(obj.data)[rest_order]
-    posed = armature.read_pose_matrices(obj)[pose_order]
-    key = rest.tobytes()
-    if running.bone_inverse is None or running.bone_inverse[0] != key:
-        running.bone_inverse = key, np.linalg.inv(rest)
-    transforms = posed @ running.bone_inverse[1]
-    transforms[(np.abs(posed - rest) <= 1e-7).all(axis=(1, 2))] = np.eye(4)
-    return transforms, rest[:, :3, 3].copy()
+    if running.seen is None or running.bones is None:
+        running.bones = glance.read_bones(cage, obj, running.bones)
+    bones = running.bones
+    posed = armature.read_pose_matrices(obj)
+    if bones.pose_order is not None:
+        posed = posed[bones.pose_order]
+    transforms = posed @ bones.inverse
+    still = np.abs(posed - bones.rest).reshape(len(posed), 16).max(axis=1) <= 1e-7
+    if still.any():
+        transforms[still] = np.eye(4)
+    return transforms, bones.heads
 
 
 def _ask_again(cage: bpy.types.Object) -> None:
@@ -370,10 +400,35 @@ def _tag_again() -> None:
 
 
 def _write_back(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> None:
-    skins.write(cage, running.session, depsgraph, running.written)
-    _write_posed_cage(running, cage.cage_rig.posed_cage)
-    _remember(running, cage.cage_rig.posed_cage)
-    _write_refit(running, cage.cage_rig.refit_armature)
+    settings = cage.cage_rig
+    plain = running.seen is not None
+    live = [(k, skin.object) for k, skin in enumerate(settings.skins)] if plain else health.live_skins(cage)
+    skins.write(live, cage, running.session, depsgraph, running.written, running.places)
+    key, posed = registry.key_of(cage), settings.posed_cage
+    running.stale = not _is_shown(posed, depsgraph)
+    if running.stale:
+        _stale.add(key)
+    else:
+        _stale.discard(key)
+        _write_posed_cage(running, posed)
+        _remember(running, posed)
+    _write_refit(running, settings.refit_armature)
+
+
+def _is_shown(posed: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether anybody sees the posed cage, or has it in hand: a hidden one is not fitted."""
+    if posed.data.is_editmode:
+        return True
+    if depsgraph.mode == "RENDER":
+        return not posed.hide_render
+    return posed.visible_get(view_layer=depsgraph.view_layer)
+
+
+def _is_back(key: registry.Key) -> bool:
+    """Whether the posed cage of this rig was hidden and is shown again."""
+    cage = registry.find(key)
+    posed = None if cage is None else cage.cage_rig.posed_cage
+    return posed is not None and posed.visible_get()
 
 
 def _write_posed_cage(running: _Running, posed: bpy.types.Object) -> None:
@@ -381,7 +436,7 @@ def _write_posed_cage(running: _Running, posed: bpy.types.Object) -> None:
     points = running.session.posed_cage()
     if running.posed is not None:
         tolerance = 1e-6 * running.session.size if posed.data.is_editmode else 0.0
-        if np.allclose(points, running.posed, rtol=0.0, atol=tolerance):
+        if positions.close(points, running.posed, tolerance):
             return
     write = positions.write_edit_mesh if posed.data.is_editmode else positions.write_base
     write(posed.data, points)
@@ -403,10 +458,12 @@ def _write_refit(running: _Running, refit: bpy.types.Object | None) -> None:
     if refit is None or refit.mode == "EDIT" or len(refit.data.bones) != len(running.session.snapshot.heads):
         return
     if running.refit_rest is None:
-        running.refit_rest = armature.read_rest_matrices(refit.data)
+        rest = armature.read_rest_matrices(refit.data)
+        running.refit_rest = rest, np.linalg.inv(rest)
     state = (running.session.revision, b"")
     if running.written.get(-1) != state:
-        armature.write_refit_pose(refit, running.refit_rest, running.session.refit_pose(running.refit_rest))
+        rest, inverse = running.refit_rest
+        armature.write_refit_pose(refit, inverse, running.session.refit_pose(rest))
         running.written[-1] = state
 
 

@@ -24,12 +24,14 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "linked": ({"bpy"}, {"adapters"}),
     "registry": ({"bpy"}, {"adapters", "layers"}),
     "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked", "migration"}),
+    "glance": ({"bpy", "numpy"}, {"adapters", "health"}),
     "migration": ({"bpy"}, {"adapters", "binding", "layers"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
     "sync": (
         {"bpy", "numpy"},
-        {"adapters", "binding", "choosing", "health", "layers", "linked", "migration", "registry", "session", "skins"},
+        {"adapters", "binding", "choosing", "glance", "health", "layers", "linked", "migration"}
+        | {"registry", "session", "skins"},
     ),
     "generator": ({"cage_rig_core", "numpy"}, set()),
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),

@@ -112,6 +112,11 @@ def fill(mesh: bpy.types.Mesh, points: Points, faces: tuple[NDArray[np.int32], N
     mesh.update(calc_edges=True)
 
 
+def close(one: NDArray[np.floating], other: NDArray[np.floating], tolerance: float) -> bool:
+    """Whether no coordinate of two arrays of one shape differs by more; what is no number differs."""
+    return bool(np.abs(one - other).max() <= tolerance)
+
+
 def apply_matrix(matrix: NDArray[np.float64], points: NDArray[np.floating]) -> Points:
     """`#V by 3` points through an affine 4 by 4 matrix that acts on columns."""
     linear = np.asarray(matrix[:3, :3], np.float32).T

@@ -401,6 +401,8 @@ def test_drawn_cages_follow(overlays: ModuleType, kept: object, bar: Rig) -> Non
     fat_key(bar)
     bend(bar, 0.6)
     found = {obj.name: strokes for obj, strokes, _ in kept.cages.hidden(subject(overlays))}
+    bar.posed.hide_set(False)  # its mesh is that of this pose when it is shown
+    update()
     for obj in (bar.cage, bar.posed):
         strokes = found[obj.name]
         dots = (strokes.start == strokes.end).all(1)

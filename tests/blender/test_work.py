@@ -1,0 +1,180 @@
+"""Nothing is done twice, and nothing for nobody: work is counted, in the core and in Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+import pytest
+from scene import Rig, rest, shown, update
+
+
+def key_pose(rig: Rig) -> None:
+    """The upper bone turns from frame 1 to 10 and stands still after."""
+    bone = rig.armature.pose.bones[1]
+    bone.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.0), (10, 1.0)):
+        bone.rotation_euler = (0.0, 0.0, angle)
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_set(1)
+
+
+def core_work(rig: Rig) -> dict[str, int]:
+    import bl_ext.user_default.cage_rig.sync as sync
+
+    return dict(sync.session_of(rig.cage).rig.work)
+
+
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of rest cages that were looked at closely."""
+    import bl_ext.user_default.cage_rig.health as health
+
+    found: list[str] = []
+    problem: Callable[[bpy.types.Object], str] = health.problem
+    monkeypatch.setattr(health, "problem", lambda cage: found.append(cage.name) or problem(cage))
+    return found
+
+
+def test_a_frame_in_which_nothing_moves_does_no_work(bar: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    import bl_ext.user_default.cage_rig.adapters.modifier as modifier
+
+    key_pose(bar)
+    bpy.context.scene.frame_set(12)
+    before, written = core_work(bar), []
+    monkeypatch.setattr(modifier, "write", lambda *given: written.append(given))
+    for frame in range(13, 20):
+        bpy.context.scene.frame_set(frame)
+    assert core_work(bar) == before and not written
+
+
+def test_a_pose_reads_no_coordinates_and_a_frame_skins_once(bar: Rig) -> None:
+    key_pose(bar)
+    before = core_work(bar)
+    for frame in range(2, 7):
+        bpy.context.scene.frame_set(frame)
+    after = core_work(bar)
+    assert after["rest_passes"] == before["rest_passes"]
+    assert after["skin_passes"] == before["skin_passes"] + 5
+    assert after["cage_fits"] == before["cage_fits"] + 5
+
+
+def test_frames_are_not_looked_at_closely_and_edits_are(bar: Rig, looks: list[str]) -> None:
+    key_pose(bar)
+    bpy.context.scene.frame_set(2)
+    looks.clear()
+    for frame in range(3, 9):
+        bpy.context.scene.frame_set(frame)
+    assert not looks
+    bar.armature.pose.bones[1].location.x = 0.1
+    update()
+    assert looks == [bar.cage.name]
+
+
+def grow_before(rig: Rig) -> None:
+    """Something that a frame has to be told of: a modifier before ours."""
+    modifier = rig.skin.modifiers.new("Subdivision", "SUBSURF")
+    rig.skin.modifiers.move(rig.skin.modifiers.find(modifier.name), 0)
+
+
+def remove_ours(rig: Rig) -> None:
+    rig.skin.modifiers.remove(rig.skin.modifiers["Cage Rig"])
+
+
+def unlink_cage(rig: Rig) -> None:
+    for collection in rig.posed.users_collection:
+        collection.objects.unlink(rig.posed)
+
+
+def lose_armature(rig: Rig) -> None:
+    for collection in rig.armature.users_collection:
+        collection.objects.unlink(rig.armature)
+
+
+def bend_bones(rig: Rig) -> None:
+    rig.armature.data.bones[1].bbone_segments = 4
+
+
+@pytest.mark.parametrize("change", [grow_before, remove_ours, unlink_cage, lose_armature, bend_bones])
+def test_a_frame_after_a_script_sees_what_it_changed(bar: Rig, change: Callable[[Rig], None]) -> None:
+    key_pose(bar)
+    for frame in (2, 3):
+        bpy.context.scene.frame_set(frame)
+    assert bar.settings.state == "LIVE"
+    change(bar)
+    bpy.context.scene.frame_set(4)
+    assert bar.settings.state == "PAUSED"
+
+
+def test_a_skin_that_moves_between_frames_is_followed(bar: Rig) -> None:
+    key_pose(bar)
+    bpy.context.scene.frame_set(5)
+    before = shown(bar.skin).copy()
+    bar.skin.location.x += 0.5
+    bpy.context.scene.frame_set(6)
+    bpy.context.scene.frame_set(5)
+    assert np.abs(shown(bar.skin) - before).max() > 1e-2  # the rest skin is elsewhere among the bones
+    bar.skin.location.x -= 0.5
+    bpy.context.scene.frame_set(6)
+    bpy.context.scene.frame_set(5)
+    assert np.abs(shown(bar.skin) - before).max() < 1e-6
+
+
+def test_a_hidden_posed_cage_is_not_fitted_until_it_is_shown(bar: Rig) -> None:
+    key_pose(bar)
+    bpy.context.scene.frame_set(8)
+    expected = rest(bar.posed).copy()
+    bpy.context.scene.frame_set(1)
+    bar.posed.hide_set(True)
+    update()
+    before, stale = core_work(bar)["cage_fits"], rest(bar.posed).copy()
+    for frame in range(2, 9):
+        bpy.context.scene.frame_set(frame)
+    assert core_work(bar)["cage_fits"] == before
+    assert np.array_equal(rest(bar.posed), stale)
+    bar.posed.hide_set(False)
+    update()
+    assert np.abs(rest(bar.posed) - expected).max() < 1e-6
+
+
+def test_a_script_moves_a_hidden_posed_cage_from_where_it_would_be(bar: Rig) -> None:
+    key_pose(bar)
+    bpy.context.scene.frame_set(8)
+    expected = rest(bar.posed).copy()
+    bpy.context.scene.frame_set(1)
+    bar.posed.hide_set(True)
+    bpy.context.scene.frame_set(8)
+    moved = rest(bar.posed)
+    moved[3] += (0.0, 0.02, 0.0)
+    expected[3] += (0.0, 0.02, 0.0)
+    bar.posed.data.attributes["position"].data.foreach_set("vector", moved.ravel())
+    bar.posed.data.update_tag()
+    update()
+    bar.posed.hide_set(False)
+    update()
+    assert bar.settings.message == ""
+    assert np.abs(rest(bar.posed) - expected).max() < 1e-5
+
+
+def test_a_rig_out_of_the_view_layer_is_not_evaluated(bar: Rig) -> None:
+    key_pose(bar)
+    bpy.context.scene.frame_set(7)
+    expected = shown(bar.skin).copy()
+    bpy.context.scene.frame_set(1)
+    apart = bpy.data.collections.new("Apart")
+    bpy.context.scene.collection.children.link(apart)
+    for obj in (bar.skin, bar.armature, bar.cage, bar.posed, bar.refit):
+        for collection in obj.users_collection:
+            collection.objects.unlink(obj)
+        apart.objects.link(obj)
+    layer = bpy.context.view_layer.layer_collection.children["Apart"]
+    layer.exclude = True
+    update()
+    before = core_work(bar)
+    for frame in range(2, 8):
+        bpy.context.scene.frame_set(frame)
+    assert core_work(bar) == before
+    layer.exclude = False
+    update()
+    assert np.abs(shown(bar.skin) - expected).max() < 1e-6
