@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from types import ModuleType
@@ -9,10 +10,12 @@ from types import ModuleType
 import bpy
 import driver
 import numpy as np
+from mathutils import Euler
 
 from blend_fixtures.build import RigObjects, build_biped
 
 Box = tuple[int, int, int, int]  # left, bottom, right, top in window pixels
+Cast = tuple[list[bpy.types.Object], bpy.types.Object | None]  # skins, and their armature
 CUT = driver.OUT / "cut"
 LOOK = 1.0  # seconds until the window shows what was done
 GROUND = 0.02  # differences below this are one colour
@@ -20,11 +23,7 @@ GROUND = 0.02  # differences below this are one colour
 
 def start(build: Callable[[], RigObjects] = build_biped, *, bind: bool = True, frame: int = 8) -> RigObjects:
     """A fresh scene with one character, seen from the front; bound where asked for."""
-    if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    bpy.data.orphans_purge(do_recursive=True)  # so that names don't count on
+    _clear()
     rig = build()
     bpy.context.scene.frame_end = 48
     bpy.context.scene.frame_set(frame)
@@ -34,6 +33,40 @@ def start(build: Callable[[], RigObjects] = build_biped, *, bind: bool = True, f
         only(*rig.all, active=rig.cage)
         bpy.ops.cage_rig.bind()
     return rig
+
+
+def start_with(build: Callable[[], Cast]) -> Cast:
+    """A fresh scene with skins and perhaps their armature, at rest, seen from the front; the sidebar closed."""
+    _clear()
+    skins, armature = build()
+    if armature is not None:
+        armature.data.pose_position = "REST"
+    bpy.context.view_layer.update()
+    _plain_view()
+    driver.look_from_front(skins)
+    driver.view()[0].spaces.active.show_region_ui = False
+    return skins, armature
+
+
+def _clear() -> None:
+    if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    bpy.data.orphans_purge(do_recursive=True)  # so that names don't count on
+
+
+def turn(around: float, above: float) -> None:
+    """Look from the front, turned by degrees around the character and from above."""
+    rotation = Euler((math.radians(90.0 - above), 0.0, math.radians(around))).to_quaternion()
+    driver.view()[0].spaces.active.region_3d.view_rotation = rotation
+
+
+def fit() -> None:
+    """What is selected fills the view."""
+    area, region = driver.view()
+    with bpy.context.temp_override(window=driver.window(), area=area, region=region):
+        bpy.ops.view3d.view_selected()
 
 
 def _plain_view() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -10,11 +9,11 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 ROOT = Path(__file__).parent.parent.parent
 sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests/window"), str(ROOT)]
 import driver
+import gallery
 import stage
 from stage import LOOK
 
@@ -303,6 +302,8 @@ def generate() -> Acts:
     with bpy.context.temp_override(window=driver.window(), area=area, region=region):
         bpy.ops.cage_rig.generate_cage("INVOKE_DEFAULT")
     yield from settle()
+    driver.key("J", at=driver.centre())  # sections at the elbows too
+    yield from settle()
     stage.zoom(0.92)
     box = stage.joined(stage.around(rig.skins, 60), top_of_sidebar(200))
     bone = rig.armature.data.bones["thigh.L"]
@@ -322,39 +323,12 @@ def generate() -> Acts:
     stage.only(cage)
     yield from settle()
     stage.picture("generated", stage.around([cage], 30))
-    yield from generated_at_work(rig.skins, rig.armature, cage)
+    yield from gallery.at_work("generate_bend", rig.skins, rig.armature, cage)
 
 
-def generated_at_work(skins: list[bpy.types.Object], armature: bpy.types.Object, cage: bpy.types.Object) -> Acts:
-    armature.hide_set(False)
-    stage.only(*skins, armature, cage, active=cage)
-    bpy.ops.cage_rig.bind()
-    armature.data.pose_position = "POSE"
-    armature.animation_data_clear()
-    for bone in armature.pose.bones:
-        bone.matrix_basis.identity()
-    made = cage.cage_rig
-    stage.hide(cage, armature, made.refit_armature)
-    stage.only(made.posed_cage)
-    yield from settle()
-    box = stage.around([made.posed_cage], 40)
-    for side, sign in (("L", -1.0), ("R", 1.0)):
-        bone = armature.pose.bones[f"forearm.{side}"]
-        turn = Matrix.Rotation(sign * math.radians(90.0), 4, (0.0, 1.0, 0.0))
-        head = Matrix.Translation(bone.head)
-        bone.matrix = head @ turn @ head.inverted() @ bone.matrix
-    yield from settle()
-    stage.picture("generate_bend_before", box)
-    points = stage.points(cage)
-    groups = {group.index for group in cage.vertex_groups if group.name.startswith(("spine", "chest", "hips"))}
-    belly = np.array([any(g.group in groups for g in vertex.groups) for vertex in cage.data.vertices])
-    points[belly, :2] *= (1.35, 1.5)
-    add_shape_key(cage, "Fat", points).value = 1.0
-    yield from settle()
-    stage.picture("generate_bend", box, side_by_side=["generate_bend_before"])
-
-
-ACTS = {act.__name__: act for act in (generate, bind, panels, drag, refit, weights, parts, driven, bake, keys)}
+ACTS = {act.__name__: act for act in (generate, bind, panels, drag, refit, weights, parts, driven, bake, keys)} | {
+    "gallery": gallery.everyone
+}
 
 
 def settle() -> Acts:
