@@ -1,18 +1,28 @@
-"""Generated cages beside those of nested-cages, in one run: the second table that `make bench` prints.
+"""Generated cages beside those of nested-cages, in one run: the table of docs/generate_bench.md.
 
-The peer (Sacht, Vouga, Jacobson: Nested Cages, 2015) decimates the skin to as many triangles and inflates that; it has
-no skeleton. It lives in a virtual environment of its own; where it can't be installed, its columns stay empty. Only
-ratios within one run count: these machines are shared.
+    python tests/bench/bench_caging.py                    every skin
+    python tests/bench/bench_caging.py human_2k_53b       some; the table keeps what was measured of the others
+    python tests/bench/bench_caging.py --only ours        or peer: the other's measures are kept
+
+The peer (Sacht, Vouga, Jacobson: Nested Cages, 2015) decimates the skin to as many triangles as our cage has and
+inflates that; it knows no skeleton. It lives in an environment of its own, which also measures both cages, by libigl;
+where that can't be installed, its columns stay empty. It computes in one thread, and its processor seconds are told,
+which a busy machine doesn't lengthen; after PEER_SECONDS of them it is given up. Ours are seconds of the clock.
 """
 
 from __future__ import annotations
 
+import argparse
+import importlib.util
+import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cage_rig_core as core
 import numpy as np
@@ -24,17 +34,66 @@ from characters import character
 from blend_fixtures.arm import arm
 
 SHARED = Path(os.environ.get("CAGE_RIG_SHARED") or ROOT.parent / "shared") / "data" / "characters"
-NAMES = ("human_2k_53b", "human_24k_52b", "proc_octopus_20k_66b", "proc_airplane")
-PEER_LIMIT = float(os.environ.get("PEER_SECONDS", "300"))
-PEER = """
-import sys, time
-import numpy as np, nested_cages
-given = np.load(sys.argv[1])
-skin, faces = np.asfortranarray(given["skin"]), np.asfortranarray(given["faces"].astype(np.int32))
-start = time.perf_counter()
-cage = nested_cages.nested_cages(skin, faces, num_faces=[int(given["count"])], quad_order=1)[0]
-np.savez(sys.argv[2], vertices=np.array(cage[0]), faces=np.array(cage[1]), seconds=time.perf_counter() - start)
-"""
+PEER = Path(__file__).with_name("nested_cages_peer.py")
+PEER_SECONDS = int(os.environ.get("PEER_SECONDS", "240"))
+OUT_OF_TIME = -24  # SIGXCPU
+ENERGIES = ("None", "Volume")  # of the peer, as it comes and pressed tightest
+KEPT = ROOT / "build" / "bench" / "caging.json"
+TABLE = ROOT / "docs" / "generate_bench.md"
+Skin = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A skin and what its cage may take at most, in seconds on two cores."""
+
+    name: str
+    limit: float
+    preview: float | None = None
+
+
+CASES = (
+    Case("arm", 10),
+    Case("human_2k_53b", 10, 1),
+    Case("human_24k_52b", 10, 1),
+    Case("human_200k_53b", 20),
+    Case("proc_octopus_20k_66b", 15, 1),
+    Case("proc_humanoid_fingers_30k_63b", 15),
+    Case("proc_airplane", 10, 1),
+)
+
+
+def skin_of(case: Case) -> Skin | None:
+    """Vertices, triangles, nodes and edges; None where there is no such file."""
+    if case.name == "arm":
+        return bare_arm()
+    path = SHARED / f"{case.name}.glb"
+    return character(path) if path.is_file() else None
+
+
+def bare_arm() -> Skin:
+    """The largest closed part of the fixture, without sleeve and hem: the peer takes one part alone."""
+    shape = arm()
+    part = shape.skins[0]
+    label = np.arange(len(part.vertices))
+    for _ in range(len(label)):
+        least = label[part.faces].min(axis=1)
+        before = label.copy()
+        for k in range(4):
+            np.minimum.at(label, part.faces[:, k], least)
+        if np.array_equal(label, before):
+            break
+    quads = part.faces[label[part.faces[:, 0]] == np.bincount(label).argmax()]
+    used, inverse = np.unique(quads, return_inverse=True)
+    quads = inverse.reshape(-1, 4)
+    nodes = [bone.head for bone in shape.bones] + [shape.bones[-1].tail]
+    edges = [(k, k + 1) for k in range(len(shape.bones))]
+    return (
+        part.vertices[used],
+        np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]),
+        np.array(nodes),
+        np.array(edges),
+    )
 
 
 def peer_python() -> Path | None:
@@ -44,70 +103,144 @@ def peer_python() -> Path | None:
     if not python.exists():
         print("installing the peer nested-cages ...", flush=True)
         made = subprocess.run([sys.executable, "-m", "venv", str(folder)], check=False, capture_output=True)
-        install = [str(python), "-m", "pip", "install", "--quiet", "nested-cages", "numpy"]
+        install = [str(python), "-m", "pip", "install", "--quiet", "nested-cages", "libigl", "numpy"]
         if made.returncode or subprocess.run(install, check=False, capture_output=True).returncode:
             print("The peer nested-cages can't be installed here; its columns stay empty.")
             return None
     return python
 
 
-def volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+def ours(case: Case, given: Skin) -> dict[str, Any]:
+    """Our cage, and how long the sections of its preview take alone."""
+    start = time.perf_counter()
+    core.cage_sections(*given)
+    preview = time.perf_counter() - start
+    start = time.perf_counter()
+    try:
+        vertices, triangles, report = core.generate_cage(*given, options={"triangles": True})
+    except core.CagingError as refused:
+        return {"refused": str(refused)}
+    found = {"seconds": time.perf_counter() - start, "preview": preview, "limit": case.limit}
+    found |= {"volume": report["volume_ratio"], "distance": report["mean_distance"]}
+    return found | {"vertices": vertices, "triangles": triangles}
 
 
-def peer(python: Path, skin: np.ndarray, faces: np.ndarray, count: int) -> str:
-    """Seconds and volume ratio of the peer's cage with as many triangles, or why there is none."""
-    with tempfile.TemporaryDirectory() as folder:
-        given, found = Path(folder, "given.npz"), Path(folder, "found.npz")
-        np.savez(given, skin=skin, faces=faces, count=count)
-        try:
-            command = [str(python), "-c", PEER, str(given), str(found)]
-            subprocess.run(command, check=False, capture_output=True, timeout=PEER_LIMIT)
-        except subprocess.TimeoutExpired:
-            return f"none within {PEER_LIMIT:.0f} s"
-        if not found.exists():
-            return "fails"
-        cage = np.load(found)
-        ratio = volume(cage["vertices"], cage["faces"]) / volume(skin, faces)
-        return f"{float(cage['seconds']):8.1f} {ratio:6.2f}"
+def peer(python: Path, given: Skin, count: int, energy: str, folder: Path) -> dict[str, Any]:
+    """The peer's cage of as many triangles, measured; or why there is none."""
+    found = folder / "found.npz"
+    found.unlink(missing_ok=True)
+    np.savez(folder / "given.npz", skin=given[0], faces=given[1], count=count)
+    command = [str(python), str(PEER), "cage", str(folder / "given.npz"), str(found), energy, str(PEER_SECONDS)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if done.returncode == OUT_OF_TIME:
+        return {"refused": f"none in {PEER_SECONDS} s"}
+    if not found.exists():
+        why = (done.stderr.strip().splitlines() or [f"exit {done.returncode}"])[-1]
+        return {"refused": "fails", "why": why}
+    with np.load(found) as cage:
+        made = {"seconds": float(min(cage["seconds"], cage["processor"]))}
+        return made | measured(python, given, cage["vertices"], cage["triangles"], folder)
 
 
-def inputs() -> dict[str, tuple[np.ndarray, ...]]:
-    shape = arm()
-    part = shape.skins[0]
-    quads = np.asarray(part.faces)
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    ends = np.array([point for bone in shape.bones for point in (bone.head, bone.tail)])
-    pairs = [(k, k + 1) for k in range(len(ends) - 1)]
-    found = {"arm of the fixtures": (np.asarray(part.vertices), faces, ends, np.array(pairs))}
-    for name in NAMES:
-        path = SHARED / f"{name}.glb"
-        if path.is_file():
-            found[name] = character(path)
-        else:
-            print(f"{path} is not there; left out")
-    return found
+def measured(python: Path, given: Skin, vertices: np.ndarray, triangles: np.ndarray, folder: Path) -> dict[str, Any]:
+    """Any cage, by libigl: the same way for both."""
+    file = folder / "measure.npz"
+    np.savez(file, skin=given[0], faces=given[1], vertices=vertices, triangles=triangles)
+    answer = subprocess.run([str(python), str(PEER), "measure", str(file)], check=True, capture_output=True, text=True)
+    return json.loads(answer.stdout)
+
+
+def blender_preview(case: Case) -> dict[str, float]:
+    """What passes in Blender between the button and the sections; nothing where there is no bpy or no file."""
+    path, script = SHARED / f"{case.name}.glb", Path(__file__).with_name("preview_seconds.py")
+    command = [sys.executable, str(ROOT / "tools" / "with_extension.py"), str(script), str(path)]
+    if not path.is_file() or importlib.util.find_spec("bpy") is None:
+        return {}
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    return json.loads(lines[-1]) if lines else {}
+
+
+def run_ours(case: Case, given: Skin) -> dict[str, Any]:
+    found = ours(case, given)
+    cage = {name: found.pop(name) for name in ("vertices", "triangles") if name in found}
+    if cage:
+        np.savez(KEPT.with_name(f"{case.name}.npz"), **cage)
+        found |= {"#vertices": len(cage["vertices"]), "#triangles": len(cage["triangles"])}
+    return found | {"faces": len(given[1]), "blender": blender_preview(case)}
+
+
+def run_peer(case: Case, given: Skin, python: Path) -> dict[str, Any]:
+    """The measures of both cages; ours is the one that was made last."""
+    with tempfile.TemporaryDirectory() as name, np.load(KEPT.with_name(f"{case.name}.npz")) as cage:
+        vertices, triangles, folder = cage["vertices"], cage["triangles"], Path(name)
+        both = {"ours": measured(python, given, vertices, triangles, folder)}
+        return both | {energy: peer(python, given, len(triangles), energy, folder) for energy in ENERGIES}
+
+
+def numbers(found: dict[str, Any]) -> str:
+    """Volume ratio, mean distance and what crosses, of one cage."""
+    if "refused" in found:
+        return f"{found['refused']} | | "
+    wrong = sum(found.get(name, 0) for name in ("outside", "crossing", "folded"))
+    faults = f" ({wrong} faults)" if wrong else ""
+    return f"{found['seconds']:.1f} | {found['volume']:.2f} | {found['distance']:.4f}{faults}"
+
+
+def write(results: dict[str, Any]) -> None:
+    """The table as a part of the manual."""
+    head = [
+        "skin",
+        "triangles",
+        "cage",
+        "preview",
+        "in Blender",
+        "node moved",
+        "cage s",
+        "limit s",
+        "volume",
+        "distance",
+    ]
+    head += ["peer s", "volume", "distance", "pressed s", "volume", "distance"]
+    lines = ["| " + " | ".join(head) + " |", "| --- " + "| ---: " * (len(head) - 1) + "|"]
+    for case in CASES:
+        if case.name not in results or "ours" not in results[case.name]:
+            continue
+        mine, others = results[case.name]["ours"], results[case.name].get("peer", {})
+        mine = mine | others.get("ours", {})
+        row = [case.name, f"{mine['faces']:,}"]
+        if "refused" in mine:
+            lines.append(f"| {' | '.join(row)} | {mine['refused']} |" + " |" * (len(head) - 3))
+            continue
+        inside = [f"{mine['blender'][key]:.2f}" if mine["blender"] else "" for key in ("preview", "moved")]
+        seconds, *rest = numbers(mine).split(" | ")
+        row += [f"{mine['#vertices']} / {mine['#triangles']}", f"{mine['preview']:.2f}", *inside, seconds]
+        row += [f"{case.limit:.0f}", *rest]
+        row += [numbers(others[energy]) if energy in others else " | | " for energy in ENERGIES]
+        lines.append("| " + " | ".join(row) + " |")
+    TABLE.write_text("\n".join(lines) + "\n")
+    print("\n".join(lines))
 
 
 def main() -> None:
-    python = peer_python()
-    head = f"{'skin':24} {'triangles':>9} {'vertices':>8} {'ours s':>8} {'volume':>6} {'distance':>8} {'preview s':>9}"
-    print(f"{head}   peer s, volume")
-    for name, (skin, faces, nodes, edges) in inputs().items():
-        start = time.perf_counter()
-        core.cage_sections(skin, faces, nodes, edges)
-        preview = time.perf_counter() - start
-        start = time.perf_counter()
-        try:
-            vertices, triangles, report = core.generate_cage(skin, faces, nodes, edges, options={"triangles": True})
-        except core.CagingError as refused:
-            print(f"{name:24} {len(faces):9} {refused}")
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("names", nargs="*", help="of skins; all of them by default")
+    asked.add_argument("--only", choices=["ours", "peer"])
+    given = asked.parse_args()
+    python = peer_python() if given.only != "ours" else None
+    KEPT.parent.mkdir(parents=True, exist_ok=True)
+    results = json.loads(KEPT.read_text()) if KEPT.exists() else {}
+    for case in CASES:
+        skin = skin_of(case) if not given.names or case.name in given.names else None
+        if skin is None:
             continue
-        seconds = time.perf_counter() - start
-        other = peer(python, skin, faces, len(triangles)) if python else "-"
-        row = f"{name:24} {len(faces):9} {len(vertices):8} {seconds:8.1f} {report['volume_ratio']:6.2f}"
-        print(f"{row} {report['mean_distance']:8.4f} {preview:9.2f}   {other}", flush=True)
+        found = results.setdefault(case.name, {})
+        if given.only != "peer":
+            found["ours"] = run_ours(case, skin)
+        if python is not None and "refused" not in found.get("ours", {"refused": ""}):
+            found["peer"] = run_peer(case, skin, python)
+        KEPT.write_text(json.dumps(results, indent=1))
+    write(results)
 
 
 if __name__ == "__main__":
