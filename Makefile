@@ -1,4 +1,4 @@
-# make demo · test · lint · bench · fixtures · zip · extension · test-matrix · soak · docs · pictures
+# make demo · test · lint · bench · bench-quick · bench-count · fixtures · zip · extension · test-matrix · soak · docs · pictures
 # Every target sets up what it needs in .venv; nothing but Python, a Rust toolchain and make is assumed.
 
 PYTHON ?= $(shell sh tools/find-python)
@@ -8,7 +8,7 @@ CORE_SOURCES := $(shell find rust_core -name '*.rs' -o -name '*.toml' -o -name '
 ADDON_SOURCES := $(shell find addon -name '*.py' -o -name '*.toml')
 DEMO_OUT ?= build/demo
 
-.PHONY: demo test test-rust test-python lint bench fixtures zip extension test-matrix test-window soak docs pictures clean
+.PHONY: demo test test-rust test-python lint bench bench-quick bench-count fixtures zip extension test-matrix test-window soak docs pictures clean
 
 demo: $(VENV)/.extension
 	$(PY) tools/with_extension.py demo/demo.py --out $(DEMO_OUT) $(if $(QUICK),--quick) \
@@ -29,11 +29,23 @@ lint: $(VENV)/.core
 	$(PY) -m ruff format --check .
 	cd addon && ../$(PY) -m mypy --config-file ../pyproject.toml session.py
 
-bench: $(VENV)/.extension
+# Named scenarios beside numpy, libigl and Blender's own modifiers: docs/bench.md and docs/bench.png.
+bench: $(VENV)/.extension $(VENV)/.bench
 	$(PY) tools/with_extension.py tests/bench/bench_blender.py
+	$(PY) tests/bench/bench_core.py
+	$(PY) tests/bench/bench_rust.py
+	$(PY) tests/bench/report.py
+	cargo bench --quiet -p cage_rig --bench skinning
 	$(PY) tests/bench/bench_caging.py
-	$(PY) tests/bench/bench_kernels.py
-	cargo bench --quiet -p cage_rig --bench frames --bench skinning --bench binding
+
+# Their answers alone, of small sizes.
+bench-quick: $(VENV)/.extension
+	$(PY) tools/with_extension.py tests/bench/bench_blender.py --quick
+	$(PY) tests/bench/bench_core.py --quick
+
+# Instructions under valgrind beside recorded numbers: a regression shows on a noisy machine too.
+bench-count: $(VENV)/.dev
+	$(PY) tests/bench/count.py
 
 fixtures: $(VENV)/.extension
 	$(PY) blend_fixtures/make_fixtures.py --out build/fixtures
@@ -73,6 +85,10 @@ $(VENV)/.dev: pyproject.toml
 
 $(VENV)/.blender: $(VENV)/.dev
 	$(PY) -m pip install --quiet --group blender
+	touch $@
+
+$(VENV)/.bench: $(VENV)/.dev
+	$(PY) -m pip install --quiet --group bench
 	touch $@
 
 $(VENV)/.docs: $(VENV)/.dev

@@ -9,7 +9,7 @@
 //!
 //! The last two are bound for a method with centers of rotation, once in peace and then cancelled at many times. Printed are the
 //! stages with their share of the time and of the bar, how far the bar is ever from the time, and how long a cancel takes.
-//! Times are the best of some, without centers unless said.
+//! Times are the best of some, without centers unless said. Lines that begin with `row` are for the table of `make bench`.
 #![allow(clippy::print_stdout, missing_docs)]
 
 #[path = "../tests/common/mod.rs"]
@@ -17,6 +17,7 @@ mod common;
 
 use cage_rig::coordinates::mean_value;
 use cage_rig::skinning::method;
+use cage_rig::sync::joint_coordinates::{joint_coordinates, SkinAtRest};
 use cage_rig::sync::maxvol::{maxvol, MaxVolOptions};
 use cage_rig::sync::BindInput;
 use cage_rig::{unwatched, CoupledRig, Error, Point, Progress, Transform};
@@ -92,16 +93,16 @@ fn best<T>(times: usize, mut work: impl FnMut() -> T) -> (f64, T) {
 }
 
 /// `rings` of `around` vertices, `joints`, `cage_rings` of four; what the paper took, where that is known.
-type Row = (usize, usize, usize, usize, &'static str);
+type Row = (usize, usize, usize, usize, Option<f64>);
 
 const ROWS: [Row; 7] = [
-    (87, 24, 24, 7, ""),
-    (87, 24, 24, 20, ""),
-    (164, 40, 64, 26, ""),
-    (313, 24, 64, 22, ""),
-    (1657, 25, 19, 17, ""),
-    (1464, 82, 98, 11, "more than 46,800 ms"),
-    (5000, 100, 100, 50, "none"),
+    (87, 24, 24, 7, None),
+    (87, 24, 24, 20, None),
+    (164, 40, 64, 26, None),
+    (313, 24, 64, 22, None),
+    (1657, 25, 19, 17, None),
+    (1464, 82, 98, 11, Some(46_800.0)),
+    (5000, 100, 100, 50, None),
 ];
 
 fn rows() {
@@ -116,7 +117,13 @@ fn rows() {
         );
         assert!(report.anchor_max_ratio <= 1.05);
         let (vertices, cage) = (rings * around, 4 * cage_rings);
-        println!("row {vertices} / {joints} / {cage}: {time:.1} ms; the paper: {paper}");
+        let (paper, beside) = paper.map_or(("-".into(), "-"), |ms: f64| {
+            (ms.to_string(), "joint coordinates alone in [CTL*20], its machine")
+        });
+        println!(
+            "row\tbind: {vertices} vertices, {joints} bones, cage of {cage}\t{}\t{time}\t{paper}\t{beside}\t-",
+            if rings > 4000 { "a character in close-up" } else { "a size of [CTL*20] Table 1" }
+        );
     }
 }
 
@@ -127,10 +134,59 @@ fn parts() {
     let found = coords.times(cage.vertices());
     let miss = found.iter().zip(points).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(miss < 1e-12 * 98.0);
-    println!("coordinates of {} points in {} faces: {time:.1} ms", points.len(), cage.triangles().len());
+    let (faces, sample) = (cage.triangles(), points.iter().step_by(40).copied().collect::<Vec<_>>());
+    let (plain, _) = best(3, || sample.iter().map(|p| as_printed(p, cage.vertices(), faces)[0]).sum::<f64>());
+    let plain = plain * points.len() as f64 / sample.len() as f64;
+    println!(
+        "row\tcoordinates: {} points, {} faces\tmost of a bind\t{time}\t{plain}\tthe formula of [JSW05] as printed, one thread\t-",
+        points.len(),
+        faces.len()
+    );
     let (time, chosen) = best(9, || unwatched(|part| maxvol(&coords, &MaxVolOptions::default(), part)));
     assert!(chosen.ratio <= 1.05);
-    println!("anchors: {time:.1} ms, {} swaps", chosen.swaps);
+    println!("anchors: {} swaps", chosen.swaps);
+    println!("row\tanchors: {} by {}\tonce a bind\t{time}\t-\t-\t-", coords.len(), coords.columns());
+    let joints = input.skeleton.joints();
+    let quads = input.skin_faces.iter().map(|face| face.iter().map(|v| *v as u32).collect::<Vec<_>>());
+    let triangles: Vec<[u32; 3]> = quads.flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    let reach = vec![1.0; points.len()];
+    let (triangles, weights) = (&triangles[..], &input.skin_weights);
+    let skin = SkinAtRest { vertices: points, triangles, weights, cage_coords: &coords, reach: &reach };
+    let (time, found) = best(3, || unwatched(|part| joint_coordinates(cage, &skin, joints, 0.1, part)));
+    let found = found.coords.times(cage.vertices());
+    let miss = found.iter().zip(joints).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(miss < 1e-9 * 98.0);
+    println!(
+        "row\tjoint coordinates: {} joints, {} faces\tthe slowest part of the paper's bind\t{time}\t46800\t[CTL*20], its machine\t-",
+        joints.len(),
+        triangles.len()
+    );
+}
+
+/// Mean value weights by the formula of [JSW05] Figure 4 as printed: an angle and an inverse cosine a corner.
+fn as_printed(point: &Point, vertices: &[Point], faces: &[[u32; 3]]) -> Vec<f64> {
+    let mut weights = vec![0.0; vertices.len()];
+    for face in faces {
+        let arms = face.map(|v| vertices[v as usize] - point);
+        let far = arms.map(|arm| arm.norm());
+        let u = [arms[0] / far[0], arms[1] / far[1], arms[2] / far[2]];
+        let angle: [f64; 3] =
+            std::array::from_fn(|k| 2.0 * ((u[(k + 1) % 3] - u[(k + 2) % 3]).norm() / 2.0).asin());
+        let half = angle.iter().sum::<f64>() / 2.0;
+        let sign = u[0].cross(&u[1]).dot(&u[2]).signum();
+        let c: [f64; 3] = std::array::from_fn(|k| {
+            let (next, last) = ((k + 1) % 3, (k + 2) % 3);
+            2.0 * half.sin() * (half - angle[k]).sin() / (angle[next].sin() * angle[last].sin()) - 1.0
+        });
+        let s = c.map(|c| sign * (1.0 - c * c).max(0.0).sqrt());
+        for k in 0..3 {
+            let (next, last) = ((k + 1) % 3, (k + 2) % 3);
+            let weight = (angle[k] - c[next] * angle[last] - c[last] * angle[next])
+                / (far[k] * angle[next].sin() * s[last]);
+            weights[face[k] as usize] += if weight.is_finite() { weight } else { 0.0 };
+        }
+    }
+    weights
 }
 
 /// Every joint from `bent` on is turned a little more than its parent.
@@ -165,6 +221,9 @@ fn drag(name: &str, input: BindInput, bent: usize) {
         }
     }
     let work = rig.work();
+    for (what, time) in [("first edit after a pose", first), ("next edits", next)] {
+        println!("row\t{what}, posed cage: {name}\ta drag waits for it\t{time}\t-\t-\t-");
+    }
     println!(
         "drag {name}: first edit {first:.3} ms, next ones {next:.3} ms; {} of {} factorisations by low rank, {} attenuated",
         work.reverse_low_rank,
@@ -175,9 +234,9 @@ fn drag(name: &str, input: BindInput, bent: usize) {
 
 fn main() {
     parts();
-    drag("104 / 64, 5 bent", snake(164, 40, 64, 26), 5);
-    drag("104 / 64, all bent", snake(164, 40, 64, 26), 31);
-    drag("352 / 64, 10 bent", snake(400, 60, 64, 88), 10);
+    drag("cage of 104, 5 of 64 joints bent", snake(164, 40, 64, 26), 5);
+    drag("cage of 104, 31 of 64 joints bent", snake(164, 40, 64, 26), 31);
+    drag("cage of 352, 10 of 64 joints bent", snake(400, 60, 64, 88), 10);
     rows();
     scenario("snake", &snake(1461, 82, 98, 11));
     scenario("worm", &snake(400, 60, 52, 30));

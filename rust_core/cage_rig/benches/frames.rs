@@ -7,6 +7,8 @@
 //!   then a drag of one and of five cage vertices, 16-bit weights, and four frames at once as bakes make them.
 //! - skinning: 40,000 vertices of four bones each, rigid or scaled, on every path.
 //! - frame: from transforms to posed skin and cage, as an add-on waits for it, alone and with threads.
+//!
+//! Lines that begin with `row` are for the table of `make bench`.
 #![allow(clippy::print_stdout, missing_docs)]
 
 #[path = "../tests/common/mod.rs"]
@@ -137,6 +139,20 @@ fn product(character: (usize, usize, usize)) {
         100.0 * read / whole,
         100.0 * multiplies / whole * peak / operations as f64,
     );
+    let size = format!("{rows} vertices, cage of {columns}");
+    let limit = read / whole;
+    println!(
+        "row\trest skin, one thread: {size}\tall that a moved cage costs\t{}\t-\t-\t{limit}",
+        whole * 1e3
+    );
+    for (what, why, time) in [
+        ("drag of one cage vertex", "one column of Φ instead of all", one),
+        ("drag of five cage vertices", "five columns of Φ instead of all", five),
+        ("16-bit weights", "half as much to read where Φ fits no cache", halves),
+    ] {
+        let (time, whole) = (time * 1e3, whole * 1e3);
+        println!("row\t{what}, one thread: {size}\t{why}\t{time}\t{whole}\tthe whole product in 32 bits\t-");
+    }
     // Four frames of one cage have one product, and four skinnings each.
     let together = (four - four_same) + whole;
     println!(
@@ -163,6 +179,10 @@ fn skinning() {
                 let mut least = Least(f64::INFINITY);
                 (0..400).for_each(|_| least.of(|| (method.pose)(&input, &mut scratch, &mut posed)));
                 assert!(posed.iter().flatten().all(|x| x.is_finite()));
+                if Some(path.name()) == Path::available().last().map(|path| path.name()) && what == "rigid" {
+                    let (count, name, time) = (rest.len(), method.name, least.0 * 1e3);
+                    println!("row\t{name}, one thread: {count} vertices of 4 bones\tbones that move alone\t{time}\t-\t-\t-");
+                }
                 format!("{} {:.1}", method.name, least.0 * 1e9 / rest.len() as f64)
             });
             let figures: Vec<String> = figures.collect();
@@ -192,6 +212,10 @@ fn frames(character: (usize, usize, usize)) {
         frame(3, columns);
     }
     let [bones, bones_threads, both, both_threads] = least.map(|least| least.0 * 1e3);
+    println!(
+        "row\tframe, threads: {rows} vertices, cage of {columns}\tfrom transforms to posed skin and cage\t{both_threads}\t\
+         {both}\tone thread\t-"
+    );
     println!(
         "frame {rows} by {columns}, ms: bones {bones:.3}, with threads {bones_threads:.3}; bones and cage {both:.3}, with \
          threads {both_threads:.3}"
