@@ -1,4 +1,4 @@
-# make demo · test · lint · bench · bench-quick · bench-count · fixtures · zip · extension · test-matrix · soak · docs · pictures
+# make demo · test · lint · bench · bench-quick · bench-count · fixtures · zip · extension · test-matrix · soak · docs · pictures · listing
 # Every target sets up what it needs in .venv; nothing but Python, a Rust toolchain and make is assumed.
 
 PYTHON ?= $(shell sh tools/find-python)
@@ -8,7 +8,7 @@ CORE_SOURCES := $(shell find rust_core -name '*.rs' -o -name '*.toml' -o -name '
 ADDON_SOURCES := $(shell find addon -name '*.py' -o -name '*.toml')
 DEMO_OUT ?= build/demo
 
-.PHONY: demo test test-rust test-python lint bench bench-quick bench-count fixtures zip extension test-matrix test-window soak docs pictures clean
+.PHONY: demo test test-rust test-python lint bench bench-quick bench-count fixtures zip extension test-matrix test-window soak docs pictures listing clean
 
 demo: $(VENV)/.extension
 	$(PY) tools/with_extension.py demo/demo.py --out $(DEMO_OUT) $(if $(QUICK),--quick) \
@@ -75,6 +75,9 @@ docs: $(VENV)/.docs
 
 pictures: $(VENV)/.extension
 	$(PY) docs/make_pictures/make_pictures.py
+
+listing: $(VENV)/.extension
+	$(PY) tools/with_extension.py docs/make_pictures/listing_renders.py
 
 $(VENV)/.dev: pyproject.toml
 	@test -n "$(PYTHON)" || { sh tools/find-python; exit 1; }

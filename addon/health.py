@@ -141,7 +141,7 @@ def _skins_problem(cage: bpy.types.Object) -> str:
             )
         if modifier.find(obj, cage) is None:
             return Problem(f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind", "rebind")
-        if not modifier.is_whole(obj):
+        if obj.override_library is not None and not modifier.is_whole(obj):
             return (
                 f"'{obj.name}' was bound with an older Cage Rig in another file; open and save that file, then reload "
                 "it here (Outliner, Blender File, Libraries)"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import struct
 import subprocess
 import tomllib
 import zipfile
@@ -123,3 +124,39 @@ def test_the_python_package_has_all_that_an_index_shows() -> None:
     assert all((folder / name).exists() for name in [project["readme"], *project["license-files"], "cage_rig_core.pyi"])
     assert "Typing :: Typed" in project["classifiers"]
     assert not any(line.startswith("License ::") for line in project["classifiers"]), "the expression says it"
+
+
+def test_a_module_for_another_machine_is_not_let_pass() -> None:
+    elf = bytearray(64)
+    elf[:4], elf[18] = b"\x7fELF", 183
+    assert build_core.machine_of(bytes(elf)) == "ELF arm64"
+    assert build_core.machine_of(b"\xcf\xfa\xed\xfe\x07\x00\x00\x01") == "Mach-O x64"
+    assert build_core.machine_of(b"MZ" + bytes(58) + b"\x40\0\0\0" + b"PE\0\0\x64\xaa") == "PE arm64"
+    assert build_core.machine_of(b"") == "nothing known"
+    assert len({platform.machine for platform in build_core.PLATFORMS}) == len(build_core.PLATFORMS)
+
+
+def picture_size(path: Path) -> tuple[int, int]:
+    """Width and height, as the header of a PNG or JPEG says."""
+    data = path.read_bytes()
+    if data.startswith(b"\x89PNG"):
+        return struct.unpack(">II", data[16:24])
+    at = 2
+    while data[at + 1] not in (0xC0, 0xC1, 0xC2):
+        at += 2 + struct.unpack(">H", data[at + 2 : at + 4])[0]
+    height, width = struct.unpack(">HH", data[at + 5 : at + 9])
+    return width, height
+
+
+def test_the_listing_is_complete() -> None:
+    """As Blender's extension site asks: a square icon, pictures of 16 to 9, the manifest's words."""
+    folder = ROOT / "docs/listing"
+    text = (folder / "listing.md").read_text()
+    manifest = tomllib.loads((ROOT / "addon/blender_manifest.toml").read_text())
+    assert manifest["tagline"] in text and ", ".join(manifest["tags"]) in text
+    assert picture_size(folder / "icon.png") == (256, 256)
+    named = set(re.findall(r"`(\w+\.jpg)`", text))
+    assert len(named) >= 4 and named == {path.name for path in folder.glob("*.jpg")}
+    for name in named:
+        assert picture_size(folder / name) == (1920, 1080), name
+        assert (folder / name).stat().st_size < 600_000, name

@@ -23,15 +23,17 @@ class Platform:
     target: str  # Rust's name of it
     tag: str  # Python's, of the wheel
     native: str  # how the compiled module in the wheel ends
+    machine: str  # what its header says that it runs on; see `machine_of`
 
 
 PLATFORMS = (
-    Platform("linux-x64", "x86_64-unknown-linux-gnu", "manylinux_2_28_x86_64", ".abi3.so"),
-    Platform("", "aarch64-unknown-linux-gnu", "manylinux_2_28_aarch64", ".abi3.so"),  # for the package index
-    Platform("windows-x64", "x86_64-pc-windows-gnu", "win_amd64", ".pyd"),
-    Platform("windows-arm64", "aarch64-pc-windows-gnullvm", "win_arm64", ".pyd"),
-    Platform("macos-arm64", "aarch64-apple-darwin", "macosx_11_0_arm64", ".abi3.so"),
-    Platform("macos-x64", "x86_64-apple-darwin", "macosx_10_12_x86_64", ".abi3.so"),
+    Platform("linux-x64", "x86_64-unknown-linux-gnu", "manylinux_2_28_x86_64", ".abi3.so", "ELF x64"),
+    # for the package index
+    Platform("", "aarch64-unknown-linux-gnu", "manylinux_2_28_aarch64", ".abi3.so", "ELF arm64"),
+    Platform("windows-x64", "x86_64-pc-windows-gnu", "win_amd64", ".pyd", "PE x64"),
+    Platform("windows-arm64", "aarch64-pc-windows-gnullvm", "win_arm64", ".pyd", "PE arm64"),
+    Platform("macos-arm64", "aarch64-apple-darwin", "macosx_11_0_arm64", ".abi3.so", "Mach-O arm64"),
+    Platform("macos-x64", "x86_64-apple-darwin", "macosx_10_12_x86_64", ".abi3.so", "Mach-O x64"),
 )
 
 
@@ -131,6 +133,24 @@ def check(wheel: Path) -> None:
     missing = [end for end in wanted if not any(name.endswith(end) for name in names)]
     if missing:
         sys.exit(f"build_core: {wheel.name} has no {', '.join(missing)}; it has {', '.join(names)}")
+    native = next(name for name in names if name.endswith(f"cage_rig_core{platform.native}"))
+    found = machine_of(zipfile.ZipFile(wheel).read(native))
+    if found != platform.machine:
+        sys.exit(f"build_core: the module in {wheel.name} is for {found}, not for {platform.machine}")
+
+
+def machine_of(module: bytes) -> str:
+    """What a compiled module runs on, by its header."""
+    if module[:4] == b"\x7fELF":
+        return {62: "ELF x64", 183: "ELF arm64"}.get(int.from_bytes(module[18:20], "little"), "another ELF machine")
+    if module[:4] == b"\xcf\xfa\xed\xfe":
+        kinds = {0x01000007: "Mach-O x64", 0x0100000C: "Mach-O arm64"}
+        return kinds.get(int.from_bytes(module[4:8], "little"), "another Mach-O machine")
+    start = int.from_bytes(module[60:64], "little")
+    if module[:2] == b"MZ" and module[start : start + 4] == b"PE\0\0":
+        kinds = {0x8664: "PE x64", 0xAA64: "PE arm64"}
+        return kinds.get(int.from_bytes(module[start + 4 : start + 6], "little"), "another PE machine")
+    return "nothing known"
 
 
 if __name__ == "__main__":
