@@ -7,6 +7,7 @@
 
 use super::skeleton::{climb, Arc, CurveSkeleton};
 use super::skin::Skin;
+use super::tips::THIN;
 use crate::error::CagingError;
 use crate::points::{first_unusable, Point};
 
@@ -102,47 +103,34 @@ fn bending_node(skin: &Skin, arc: &Arc, at: usize, s: f64) -> ControlNode {
     ControlNode { kind: NodeKind::Bending, arc: at, point, direction, radius, node: nearest_node(arc, s) }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// Pulled inward from the tip until its radius is 0.3 of the arc's.
 fn leaf_node(skin: &Skin, arc: &Arc, at: usize, side: usize, neighbour: Option<f64>) -> ControlNode {
     let length = arc.length();
-    let outward =
-        |s: f64| if side == 0 { -arc.direction(s, 0.1 * length) } else { arc.direction(s, 0.1 * length) };
     let from_tip = |d: f64| if side == 0 { d } else { length - d };
-    let wanted = 0.3 * median(arc.radii.clone());
-    let node = nearest_node(arc, from_tip(0.0));
-    let tip = arc.at(from_tip(0.0));
-    let make = |point: Point, out: Point| {
-        let direction = if side == 0 { -out } else { out };
-        let radius = skin.depth(&point).max(1e-3);
-        ControlNode { kind: NodeKind::Leaf, arc: at, point, direction, radius, node }
-    };
-    if skin.depth(&tip) > wanted {
-        let out = outward(from_tip(0.0));
-        let step = 0.25 * wanted.max(2e-3);
-        let mut point = tip;
-        for _ in 0..400 {
-            let next = climb(skin, point + out * step, Some(out));
-            if skin.depth(&next) < wanted || (next - point).dot(&out) < 0.2 * step {
-                break;
-            }
-            point = next;
-        }
-        return make(point, out);
-    }
-    // Inward, but not past half the way to the neighbour.
+    let wanted = THIN * median(arc.radii.clone());
+    // Not past half the way to the neighbour.
     let room = neighbour.map_or(length, |n| (from_tip(0.0) - n).abs()) * 0.5;
     let steps = 40;
     let found = (0..=steps)
         .map(|k| room * f64::from(k) / f64::from(steps))
         .find(|d| arc.radius_at(from_tip(*d)) >= wanted);
-    let d = found.unwrap_or(room);
-    let s = from_tip(d);
-    let out = outward(s);
-    make(climb(skin, arc.at(s), Some(out)), out)
+    let s = from_tip(found.unwrap_or(room));
+    let direction = arc.direction(s, 0.1 * length);
+    let point = climb(skin, arc.at(s), Some(direction));
+    let radius = skin.depth(&point).max(1e-3);
+    ControlNode {
+        kind: NodeKind::Leaf,
+        arc: at,
+        point,
+        direction,
+        radius,
+        node: nearest_node(arc, from_tip(0.0)),
+    }
 }
 
 /// Bending nodes of an arc without the user.

@@ -7,6 +7,7 @@
 
 use super::obstacle::{Mesh, Obstacles};
 use super::skin::Skin;
+use super::symmetry;
 use crate::error::CagingError;
 use crate::mesh::Polygons;
 use crate::points::Point;
@@ -15,8 +16,14 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 /// Bands from one end to the other, fewer on a coarse mesh.
 const BANDS: f64 = 48.0;
+/// Edges are no longer, relative to the size.
+const EDGE: f64 = 0.015;
 /// Rounds of smoothing of the distance, which runs along edges, before it is cut.
 const SMOOTHING: usize = 20;
+/// A tip is near a ball that would reach it with this times its radius.
+const NEAR_BALL: f64 = 1.2;
+/// What is nearer to the skin than this, relative to the size, is at the surface.
+const SHALLOW: f64 = 4e-3;
 /// A node is left out where it is nearer than this to the straight line, in radii.
 const STRAIGHT: f64 = 0.25;
 
@@ -31,11 +38,17 @@ pub struct ExtractedSkeleton {
 
 /// The curve skeleton of a closed skin (`vertices` `#V by 3`).
 pub fn extract_skeleton(vertices: &[Point], faces: &Polygons) -> Result<ExtractedSkeleton, CagingError> {
-    let skin = Skin::new(vertices, faces)?;
-    let Mesh { points, triangles } = Obstacles::of(&skin).growth.mesh;
+    let mut skin = Skin::new(vertices, faces)?;
+    skin.symmetric = symmetry::is_symmetric(&skin);
+    let mut mesh = Obstacles::of(&skin).growth.mesh;
+    mesh.refine(EDGE);
+    let Mesh { points, triangles } = mesh;
     let around = neighbours(points.len(), &triangles);
-    let distance = surface_distance(&points, &around);
-    let rings = rings(&points, &around, &distance);
+    let distance = surface_distance(&points, &around, skin.symmetric);
+    let mut rings = rings(&points, &around, &distance);
+    if skin.symmetric {
+        rings = mirrored(&skin, &rings);
+    }
     let graph = thin(&skin, rings);
     if graph.edges.is_empty() {
         return Err(CagingError::SkeletonEmpty);
@@ -56,11 +69,12 @@ fn neighbours(count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     found
 }
 
-/// Distances along edges from the vertex `start`; infinite on other parts of the surface.
-fn along_edges(points: &[Point], around: &[Vec<u32>], start: usize) -> Vec<f64> {
+/// Distances along edges from the nearest of the vertices `starts`; infinite on other parts of the
+/// surface.
+fn along_edges(points: &[Point], around: &[Vec<u32>], starts: &[usize]) -> Vec<f64> {
     let mut best = vec![f64::INFINITY; points.len()];
-    let mut heap = BinaryHeap::from([Reverse((0_u64, start))]);
-    best[start] = 0.0;
+    let mut heap: BinaryHeap<_> = starts.iter().map(|start| Reverse((0_u64, *start))).collect();
+    starts.iter().for_each(|start| best[*start] = 0.0);
     while let Some(Reverse((bits, v))) = heap.pop() {
         if f64::from_bits(bits) > best[v] {
             continue;
@@ -82,20 +96,31 @@ fn farthest(distance: &[f64]) -> usize {
     finite.max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a))).unwrap_or(0)
 }
 
-/// Smoothed distances from a far end of the largest part; infinite elsewhere.
-fn surface_distance(points: &[Point], around: &[Vec<u32>]) -> Vec<f64> {
+/// Smoothed distances from a far end of the largest part, on a symmetric skin also from its mirror
+/// image unless that is at the other end; infinite elsewhere.
+fn surface_distance(points: &[Point], around: &[Vec<u32>], symmetric: bool) -> Vec<f64> {
     let mut seen = vec![false; points.len()];
     let mut largest = (0, 0);
     for start in (0..points.len()).filter(|v| !around[*v].is_empty()) {
         if !seen[start] {
-            let of_part = along_edges(points, around, start);
+            let of_part = along_edges(points, around, &[start]);
             let count = of_part.iter().filter(|d| d.is_finite()).count();
             seen.iter_mut().zip(&of_part).for_each(|(s, d)| *s |= d.is_finite());
             largest = largest.max((count, start));
         }
     }
-    let from = farthest(&along_edges(points, around, largest.1));
-    let mut distance = along_edges(points, around, from);
+    let reached = along_edges(points, around, &[largest.1]);
+    let mut starts = vec![farthest(&reached)];
+    if symmetric {
+        let image = symmetry::image(&points[starts[0]]);
+        let apart = |v: usize| (points[v] - image).norm_squared();
+        let part = (0..points.len()).filter(|v| reached[*v].is_finite());
+        starts.extend(part.min_by(|a, b| apart(*a).total_cmp(&apart(*b))));
+        let first = along_edges(points, around, &starts[..1]);
+        let far = first[farthest(&first)];
+        starts.retain(|v| first[*v] < 0.5 * far);
+    }
+    let mut distance = along_edges(points, around, &starts);
     for _ in 0..SMOOTHING {
         let old = distance.clone();
         for (v, near) in around.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
@@ -168,18 +193,41 @@ fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64]) -> Graph {
     graph
 }
 
-/// Cuts off ends in corners of the surface: what is much nearer to it than its neighbour.
+/// The half of the graph with x > 0 and its mirror image, joined by what is in the middle.
+fn mirrored(skin: &Skin, graph: &Graph) -> Graph {
+    let count = graph.points.len();
+    let middle: Vec<bool> = graph.points.iter().map(|p| p.x.abs() < 0.5 * skin.depth(p)).collect();
+    let mut both = Graph::default();
+    let on_plane = |p: &Point| Point::new(0.0, p.y, p.z);
+    both.points
+        .extend((0..count).map(|i| if middle[i] { on_plane(&graph.points[i]) } else { graph.points[i] }));
+    both.points.extend(graph.points.iter().map(symmetry::image));
+    let other = |i: usize| if middle[i] { i } else { i + count };
+    let kept = |i: usize| middle[i] || graph.points[i].x > 0.0;
+    for &(a, b) in graph.edges.iter().filter(|(a, b)| kept(*a) && kept(*b)) {
+        both.link(a, b);
+        both.link(other(a), other(b));
+    }
+    both
+}
+
+/// Cuts ends back while they are at the surface, or the inscribed ball of the next node reaches near
+/// their tip.
 fn trim(skin: &Skin, graph: &mut Graph) {
-    let depth: Vec<f64> = graph.points.iter().map(|p| skin.depth(p)).collect();
+    let mut tips = graph.points.clone();
     loop {
         let around = graph.around();
-        let end = |i: &usize| match around[*i][..] {
-            [next] => depth[*i] < 0.8 * depth[next],
-            _ => false,
+        let shallow = |at: usize| skin.depth(&graph.points[at]) < SHALLOW;
+        let reached = |tip: usize, at: usize| {
+            (tips[tip] - graph.points[at]).norm() < NEAR_BALL * skin.depth(&graph.points[at])
         };
+        let end = |i: &usize| around[*i].len() == 1 && (shallow(*i) || reached(*i, around[*i][0]));
         let Some(i) = (0..around.len()).find(end).filter(|_| graph.edges.len() > 2) else { return };
         let next = around[i][0];
         graph.edges.remove(&(i.min(next), i.max(next)));
+        if around[next].len() == 2 {
+            tips[next] = tips[i];
+        }
     }
 }
 
@@ -211,9 +259,15 @@ fn thin(skin: &Skin, mut graph: Graph) -> Graph {
         let mut taken = vec![false; graph.points.len()];
         let mut out = Vec::new();
         for i in 0..graph.points.len() {
-            if straight(&i) && !around[i].iter().any(|k| taken[*k]) {
-                taken[i] = true;
-                out.push(i);
+            // With its mirror image, if it has one.
+            let image = symmetry::image(&graph.points[i]);
+            let both =
+                (0..graph.points.len()).filter(|k| *k == i || graph.points[*k] == image && straight(k));
+            let both: Vec<usize> = both.collect();
+            let free = |k: &usize| !taken[*k] && around[*k].iter().all(|n| !taken[*n] && !both.contains(n));
+            if straight(&i) && both.iter().all(free) {
+                both.iter().for_each(|k| taken[*k] = true);
+                out.extend(both);
             }
         }
         if out.is_empty() {
@@ -249,7 +303,14 @@ mod tests {
         let rings: Vec<(f64, f64)> = (0..31).map(|i| (f64::from(i) / 3.0, 0.6)).collect();
         let (vertices, faces) = square_tube(&rings);
         let found = extract_skeleton(&vertices, &faces).expect("a line");
-        assert!(found.nodes.iter().all(|p| p.y.abs() < 0.2 && p.z.abs() < 0.2), "off the middle");
+        // Its ends may lead into corners.
+        let inner = |p: &&Point| (1.0..9.0).contains(&p.x);
+        assert!(found.nodes.iter().filter(inner).count() >= 3);
+        assert!(found.nodes.iter().filter(inner).all(|p| p.yz().norm() < 0.1), "off the middle");
+        for p in &found.nodes {
+            let image = Point::new(10.0 - p.x, p.y, p.z);
+            assert!(found.nodes.iter().any(|q| (q - image).norm() < 1e-9), "not symmetric at {p}");
+        }
         let length: f64 = found
             .edges
             .iter()

@@ -8,7 +8,8 @@
 use super::contacts::{contacts, narrower, Body, Contact, Points};
 use super::contraction::Start;
 use super::energy::{energy, newton_step, Shape, Weights};
-use super::obstacle::StandIn;
+use super::obstacle::{Mesh, StandIn};
+use super::report::least_angle;
 use super::tubes::Scaffold;
 use crate::geometry::collision::free_part;
 use crate::points::Point;
@@ -40,6 +41,13 @@ const STEP: f64 = 3e-3;
 /// Gaps narrower than this part of the reach make the skin wait, so many times in a row.
 const PRESSED: f64 = 0.02;
 const WAITS: usize = 4;
+
+/// Weight against flat triangles while the cage is tightened.
+const QUALITY: f64 = 1e-4;
+/// A face with a smaller angle (degrees) is a sliver, and so often the weight against flat triangles
+/// is raised to widen it.
+const SLIVER: f64 = 7.0;
+const HARDER: i32 = 5;
 
 /// A cage in the middle of its growth.
 pub(crate) struct Inflation<'a> {
@@ -175,26 +183,13 @@ impl<'a> Inflation<'a> {
         options: &InflationOptions,
         progress: &Part,
     ) -> Result<(), Cancelled> {
-        let rest = &obstacle.mesh.points;
-        let body = Body::new(rest, &obstacle.mesh.triangles);
-        let clearance = options.clearance + obstacle.margin;
+        let mut resting = Resting::new(obstacle, options);
         let mut reach = options.reach;
         let (mut stiffness, mut limit) = (0.3, STEP);
         for round in 0..options.rounds {
             progress.reach(round as f64 / options.rounds as f64)?;
-            self.body.tree.refit(&self.cage);
-            let reached = reach + clearance + 2.0 * limit;
-            let mut around = Surroundings::of(&self.body, &body, &self.cage, rest, reached);
-            let weights = Weights {
-                shape: stiffness,
-                anchor: 1e-3,
-                volume: options.tightness,
-                quality: 1e-4,
-                reach,
-                least: clearance.min(0.5 * around.narrowest()),
-            };
-            let here = self.cage.clone();
-            let moved = self.relax(&mut around, rest, &here, &weights, (2, limit));
+            let weights = resting.weights(options, (reach, stiffness, QUALITY));
+            let moved = self.press(&mut resting, weights, limit);
             limit = (3.0 * moved).clamp(0.1 * STEP, STEP);
             if round % 8 == 7 {
                 reach = (0.6 * reach).max(4.0 * options.clearance);
@@ -205,6 +200,48 @@ impl<'a> Inflation<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Widens slivers of a tightened cage, pressing harder and harder against them. True when there
+    /// were some.
+    pub(crate) fn open_slivers(
+        &mut self,
+        obstacle: &StandIn,
+        options: &InflationOptions,
+        progress: &Part,
+    ) -> Result<bool, Cancelled> {
+        let mut resting = Resting::new(obstacle, options);
+        for harder in 1..=HARDER {
+            if self.least_angle() >= SLIVER {
+                return Ok(harder > 1);
+            }
+            progress.reach(f64::from(harder - 1) / f64::from(HARDER))?;
+            let shape = (4.0 * options.clearance, 0.05, QUALITY * 6.0_f64.powi(harder));
+            for _ in 0..6 {
+                let weights = resting.weights(options, shape);
+                self.press(&mut resting, weights, STEP);
+            }
+        }
+        Ok(true)
+    }
+
+    /// One round around a resting obstacle: no longer than `limit`. How far anything moved.
+    fn press(&mut self, resting: &mut Resting, mut weights: Weights, limit: f64) -> f64 {
+        self.body.tree.refit(&self.cage);
+        let (clearance, points) = (resting.clearance, resting.points);
+        let reached = weights.reach + clearance + 2.0 * limit;
+        let mut around = Surroundings::of(&self.body, &resting.body, &self.cage, points, reached);
+        // A gap that is too narrow may become wider, never narrower than it was allowed to be.
+        resting.least = clearance.min((0.5 * around.narrowest()).max(resting.least));
+        weights.least = resting.least;
+        let here = self.cage.clone();
+        self.relax(&mut around, points, &here, &weights, (2, limit))
+    }
+
+    /// Of all corners of faces, degrees.
+    fn least_angle(&self) -> f64 {
+        let angle = |t: &[u32; 3]| least_angle(t.map(|v| self.cage[v as usize]));
+        self.faces.iter().map(angle).fold(180.0, f64::min)
     }
 
     /// Some Newton steps toward `goal`, together no longer than `limit`. How far anything moved.
@@ -250,6 +287,29 @@ impl<'a> Inflation<'a> {
         }
         self.edges = edges;
         limit - left
+    }
+}
+
+/// An obstacle that stays where it is while the cage is tightened around it.
+struct Resting<'a> {
+    points: &'a [Point],
+    body: Body,
+    /// Wanted in every gap.
+    clearance: f64,
+    /// What no gap falls below.
+    least: f64,
+}
+
+impl<'a> Resting<'a> {
+    fn new(obstacle: &'a StandIn, options: &InflationOptions) -> Self {
+        let Mesh { points, triangles } = &obstacle.mesh;
+        let body = Body::new(points, triangles);
+        Self { points, body, clearance: options.clearance + obstacle.margin, least: 0.0 }
+    }
+
+    fn weights(&self, options: &InflationOptions, (reach, shape, quality): (f64, f64, f64)) -> Weights {
+        let (volume, least) = (options.tightness, self.least);
+        Weights { shape, anchor: 1e-3, volume, quality, reach, least }
     }
 }
 

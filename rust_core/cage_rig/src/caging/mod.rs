@@ -22,6 +22,7 @@ mod sections;
 pub(crate) mod skeleton;
 mod skin;
 mod symmetry;
+mod tips;
 mod tubes;
 mod verify;
 
@@ -145,9 +146,11 @@ impl Generator {
         options: CagingOptions,
     ) -> Result<Self, CagingError> {
         options.check()?;
-        let skin = Skin::new(vertices, faces)?;
-        let skeleton = curve_skeleton(&skin, nodes, edges, options.detail, &[])?;
-        let graph = (nodes.to_vec(), edges.to_vec());
+        let mut skin = Skin::new(vertices, faces)?;
+        skin.symmetric = !options.asymmetric && symmetry::is_symmetric(&skin);
+        let mirrored = if skin.symmetric { symmetry::mirror_graph(&skin, nodes, edges) } else { None };
+        let graph = mirrored.unwrap_or_else(|| (nodes.to_vec(), edges.to_vec()));
+        let skeleton = curve_skeleton(&skin, &graph.0, &graph.1, options.detail, &[])?;
         Ok(Self { skin, skeleton, options, graph, traced: Traced::default(), obstacles: OnceLock::new() })
     }
 
@@ -178,8 +181,7 @@ impl Generator {
         part: &Part,
     ) -> Result<CrossSections, CagingError> {
         let mut nodes = control_nodes(&self.skin, skeleton, bending, self.options.placement)?;
-        let symmetric = !self.options.asymmetric && symmetry::is_symmetric(&self.skin);
-        let partners = if symmetric { symmetry::partners(&nodes) } else { None };
+        let partners = if self.skin.symmetric { symmetry::partners(&nodes) } else { None };
         if let Some(partners) = &partners {
             symmetry::mirror_nodes(&mut nodes, partners);
         }
@@ -262,23 +264,43 @@ impl Generator {
         }
         clock.lap("growth");
         tightening.begin("tightening the cage")?;
+        let mut cages = vec![inflation.cage.clone()];
+        let [tightening, opening] = tightening.split([4.0, 1.0]);
         inflation.tighten(fine, options, &tightening)?;
+        cages.push(inflation.cage.clone());
+        if inflation.open_slivers(fine, options, &opening)? {
+            cages.push(inflation.cage);
+        }
         clock.lap("tightening");
         checking.begin("checking the cage")?;
-        let vertices: Vec<Point> = inflation.cage.iter().map(|p| self.skin.space.leave(p)).collect();
-        let (skin, triangles) = (&self.skin.original, &self.skin.triangles);
-        if let Some(fault) = verify::fault(&vertices, &scaffold.triangles(), skin, triangles) {
-            let node = nodes[scaffold.owner[fault.vertex]].node;
-            return Err(
-                CagingError::NotValid { node, place: vertices[fault.vertex], fault: fault.what }.into()
-            );
-        }
+        let vertices = self.last_valid(&cages, &scaffold, &nodes)?;
         let faces = self.faces(&scaffold, &vertices);
         clock.lap("verify");
         let dropped = skeleton.dropped.clone();
         let found = (&nodes[..], &sections[..], &scaffold);
         let report = report::cage(&self.skin, found, &vertices, (mirror, dropped, clock.laps));
         Ok(GeneratedCage { vertices, faces, report })
+    }
+
+    /// The last cage of several that the exact check passes, in the skin's space: tightening, around a
+    /// stand-in, may have lost what growth had.
+    fn last_valid(
+        &self,
+        cages: &[Vec<Point>],
+        scaffold: &Scaffold,
+        nodes: &[ControlNode],
+    ) -> Result<Vec<Point>, CagingError> {
+        let mut refused = CagingError::TooFewSections { sections: nodes.len() };
+        for cage in cages.iter().rev() {
+            let vertices: Vec<Point> = cage.iter().map(|p| self.skin.space.leave(p)).collect();
+            let (skin, triangles) = (&self.skin.original, &self.skin.triangles);
+            let Some(fault) = verify::fault(&vertices, &scaffold.triangles(), skin, triangles) else {
+                return Ok(vertices);
+            };
+            let node = nodes[scaffold.owner[fault.vertex]].node;
+            refused = CagingError::NotValid { node, place: vertices[fault.vertex], fault: fault.what };
+        }
+        Err(refused)
     }
 
     /// The faces, and a start free of crossings: the largest rings that have one.

@@ -98,6 +98,27 @@ impl Mesh {
         self.split(&middles);
     }
 
+    /// Halves edges until none is longer than `limit`.
+    pub(crate) fn refine(&mut self, limit: f64) {
+        loop {
+            let mut middles = HashMap::new();
+            for t in &self.triangles {
+                for k in 0..3 {
+                    let (a, b) = (t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3]));
+                    let [p, q] = [a, b].map(|v| self.points[v as usize]);
+                    if (q - p).norm() > limit && !middles.contains_key(&(a, b)) {
+                        self.points.push((p + q) * 0.5);
+                        middles.insert((a, b), self.points.len() as u32 - 1);
+                    }
+                }
+            }
+            if middles.is_empty() {
+                return;
+            }
+            self.split(&middles);
+        }
+    }
+
     /// Cuts the triangles at points on their sides: `middles` has them by the ends of the side, the
     /// smaller first.
     pub(crate) fn split(&mut self, middles: &HashMap<(u32, u32), u32>) {

@@ -6,9 +6,11 @@
 
 use super::skeleton::{join, Arc, CurveSkeleton, Graph};
 use super::skin::Skin;
+use super::symmetry::image;
 use crate::points::Point;
 
-/// Removes one leaf arc that does not stick out. True when there was one.
+/// Removes one leaf arc that does not stick out, with its mirror image on a symmetric skin. True when
+/// there was one.
 pub(super) fn prune(
     skin: &Skin,
     graph: &mut Graph,
@@ -41,8 +43,12 @@ pub(super) fn prune(
         };
         short || leaves.iter().any(sibling)
     };
-    let Some(&(k, ..)) = leaves.iter().find(|leaf| hidden(leaf)) else { return false };
-    remove(graph, &skeleton.arcs[k], |junction| skeleton.junctions[junction].degree == 1);
+    let Some(&(k, tip, _)) = leaves.iter().find(|leaf| hidden(leaf)) else { return false };
+    let at = |tip: usize| skeleton.junctions[tip].point;
+    let is_image = |other: usize| skin.symmetric && (at(other) - image(&at(tip))).norm() < 1e-6;
+    for (k, ..) in leaves.iter().filter(|leaf| leaf.0 == k || is_image(leaf.1)) {
+        remove(graph, &skeleton.arcs[*k], |junction| skeleton.junctions[junction].degree == 1);
+    }
     true
 }
 

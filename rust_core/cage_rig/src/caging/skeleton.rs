@@ -6,6 +6,8 @@
 
 use super::pruning::{drop_crown, merge, prune};
 use super::skin::Skin;
+use super::symmetry::image;
+use super::tips::{lead_on, unfold};
 use crate::error::CagingError;
 use crate::points::{first_unusable, Point};
 use rayon::prelude::*;
@@ -73,6 +75,35 @@ impl Arc {
         (b - a).try_normalize(1e-12).unwrap_or_else(Point::x)
     }
 
+    /// Adds points (with their depths) beyond one end.
+    pub(super) fn append(&mut self, side: usize, beyond: &[(Point, f64)]) {
+        if side == 0 {
+            self.turn();
+        }
+        for (point, depth) in beyond {
+            if let (Some(last), Some(s)) = (self.path.last(), self.along.last()) {
+                self.along.push(s + (point - last).norm());
+            }
+            self.path.push(*point);
+            self.radii.push(*depth);
+            self.nodes.push(None);
+        }
+        if side == 0 {
+            self.turn();
+        }
+    }
+
+    /// The other way round.
+    fn turn(&mut self) {
+        let length = self.length();
+        self.ends.reverse();
+        self.path.reverse();
+        self.radii.reverse();
+        self.nodes.reverse();
+        self.along.reverse();
+        self.along.iter_mut().for_each(|s| *s = length - *s);
+    }
+
     /// Nearest point: (distance, s).
     pub(crate) fn nearest(&self, p: &Point) -> (f64, f64) {
         let mut best = (f64::INFINITY, 0.0);
@@ -129,9 +160,10 @@ pub(crate) fn curve_skeleton(
     let mut graph = read(skin, nodes, edges)?;
     clip(skin, &mut graph)?;
     keep_largest(&mut graph);
+    unfold(skin, &mut graph);
     recentre(skin, &mut graph);
     loop {
-        let skeleton = cut(skin, &graph);
+        let mut skeleton = cut(skin, &graph);
         if skeleton.arcs.is_empty() {
             return Err(CagingError::SkeletonOutside);
         }
@@ -139,6 +171,7 @@ pub(crate) fn curve_skeleton(
             || drop_crown(skin, &mut graph, &skeleton)
             || merge(&mut graph, &skeleton);
         if !changed {
+            lead_on(skin, &mut skeleton);
             return Ok(skeleton);
         }
     }
@@ -265,14 +298,21 @@ fn recentre(skin: &Skin, graph: &mut Graph) {
 
 /// Uphill in depth from `start`, at right angles to `axis`, at most a radius far.
 pub(crate) fn climb(skin: &Skin, start: Point, axis: Option<Point>) -> Point {
+    if skin.is_image(&start) {
+        return image(&climb(skin, image(&start), axis.as_ref().map(image)));
+    }
     let mut at = start;
     let mut depth = skin.depth(&at);
     let limit = 1.5 * depth.max(4.0 * MARGIN);
+    let stays_on_plane = skin.symmetric && start.x.abs() < 1e-9;
     for _ in 0..24 {
         let Some(near) = skin.tree.nearest(&skin.points, &at) else { return at };
         let mut up = at - near.point;
         if let Some(axis) = axis {
             up -= axis * axis.dot(&up);
+        }
+        if stays_on_plane {
+            up.x = 0.0;
         }
         let Some(up) = up.try_normalize(1e-12) else { return at };
         let next = at + up * (0.12 * depth.max(MARGIN));

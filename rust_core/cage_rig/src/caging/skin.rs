@@ -4,6 +4,7 @@
 //! of it told in [`Repairs`]. What is open or not manifold after that is refused by its place.
 //! Coordinates are moved and scaled to a bounding diagonal of 1. Linear in the faces.
 
+use super::symmetry::image;
 use crate::error::CagingError;
 use crate::geometry::bvh::Bvh;
 use crate::mesh::{triangulate, FaceFault, Polygons};
@@ -23,6 +24,9 @@ pub struct Skin {
     pub(crate) space: UnitSpace,
     /// What had to be done to the mesh.
     pub repairs: Repairs,
+    /// The half with x < 0 counts as the mirror image of the other, so that no rounding on one side
+    /// alone decides anything.
+    pub(crate) symmetric: bool,
 }
 
 /// What was done to a skin before it could be used.
@@ -99,12 +103,12 @@ impl Skin {
         let original = points;
         let points: Vec<Point> = original.iter().map(|p| space.enter(p)).collect();
         let tree = Bvh::new(&points, &triangles);
-        Ok(Self { points, triangles, original, tree, space, repairs })
+        Ok(Self { points, triangles, original, tree, space, repairs, symmetric: false })
     }
 
     /// Signed distance in unit space: positive inside.
     pub(crate) fn depth(&self, point: &Point) -> f64 {
-        let distance = self.tree.nearest(&self.points, point).map_or(0.0, |n| n.distance);
+        let distance = self.tree.nearest(&self.points, &self.folded(point)).map_or(0.0, |n| n.distance);
         if self.contains(point) {
             distance
         } else {
@@ -113,7 +117,20 @@ impl Skin {
     }
 
     pub(crate) fn contains(&self, point: &Point) -> bool {
-        self.tree.winding(&self.points, point) > 0
+        self.tree.winding(&self.points, &self.folded(point)) > 0
+    }
+
+    /// Whether a symmetric skin is looked at on its other side for this point.
+    pub(crate) fn is_image(&self, point: &Point) -> bool {
+        self.symmetric && point.x < 0.0
+    }
+
+    fn folded(&self, point: &Point) -> Point {
+        if self.is_image(point) {
+            image(point)
+        } else {
+            *point
+        }
     }
 
     /// Whether the segment from `a` to `b` stays inside, looked at in `steps` places.

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// How far a mirrored skin vertex may be from the skin, relative to the size.
 const TOLERANCE: f64 = 1e-3;
 
-fn image(p: &Point) -> Point {
+pub(super) fn image(p: &Point) -> Point {
     Point::new(-p.x, p.y, p.z)
 }
 
@@ -25,6 +25,43 @@ pub(crate) fn is_symmetric(skin: &Skin) -> bool {
     let near =
         |p: &&Point| skin.tree.nearest(&skin.points, &image(p)).is_some_and(|n| n.distance < TOLERANCE);
     samples.par_iter().all(near)
+}
+
+/// How far a node of the skeleton may be from where its partner is mirrored to, relative to the size.
+const NEAR: f64 = 0.03;
+
+/// The graph of a skeleton (user's space) with every node at the mirror image of another, or on the
+/// plane, and every edge with its image; `None` where nodes have no partners.
+pub(crate) fn mirror_graph(
+    skin: &Skin,
+    nodes: &[Point],
+    edges: &[[i64; 2]],
+) -> Option<(Vec<Point>, Vec<[i64; 2]>)> {
+    let points: Vec<Point> = nodes.iter().map(|p| skin.space.enter(p)).collect();
+    let apart = |i: usize, j: usize| (image(&points[i]) - points[j]).norm();
+    let nearest = |i: usize| (0..points.len()).min_by(|a, b| apart(i, *a).total_cmp(&apart(i, *b)));
+    let partner: Vec<usize> = (0..points.len()).map(nearest).collect::<Option<_>>()?;
+    if (0..points.len()).any(|i| partner[partner[i]] != i || apart(i, partner[i]) > NEAR) {
+        return None;
+    }
+    let even = |i: usize| (points[i] + image(&points[partner[i]])) * 0.5;
+    let nodes = (0..points.len()).map(|i| skin.space.leave(&even(i))).collect();
+    // An edge that its image lacks was made on one side only: that of the greater x.
+    let inside = |n: i64| usize::try_from(n).ok().filter(|n| *n < points.len());
+    let mut found: Vec<[i64; 2]> = Vec::new();
+    for &[a, b] in edges {
+        let (i, j) = (inside(a)?, inside(b)?);
+        let other = [partner[i] as i64, partner[j] as i64];
+        let there = edges.iter().any(|e| *e == other || *e == [other[1], other[0]]);
+        let side = points[i].x + points[j].x;
+        if there || side > 0.0 {
+            found.push([a, b]);
+        }
+        if !there && side > 0.0 {
+            found.push(other);
+        }
+    }
+    Some((nodes, found))
 }
 
 /// For each control node that at its mirror image; `None` when some node has none.
@@ -105,6 +142,19 @@ fn pair_up(corners: &[Point]) -> Option<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_graph_that_is_almost_symmetric_becomes_symmetric() {
+        let rings: Vec<(f64, f64)> = (0..11).map(|i| (f64::from(i) - 5.0, 1.0)).collect();
+        let (vertices, faces) = crate::fixtures::shapes::square_tube(&rings);
+        let skin = Skin::new(&vertices, &faces).expect("closed");
+        let nodes = [(0.02, 0.0), (4.0, 0.1), (-4.1, 0.0), (4.5, 0.1)].map(|(x, y)| Point::new(x, y, 0.0));
+        let (points, edges) = mirror_graph(&skin, &nodes[..3], &[[0, 1]]).expect("partners");
+        assert!(points[0].x.abs() < 1e-12 && (image(&points[1]) - points[2]).norm() < 1e-12);
+        assert_eq!(edges, [[0, 1], [0, 2]], "the edge of one side has its image");
+        assert!(mirror_graph(&skin, &nodes, &[[0, 1]]).is_none(), "the fourth has no partner");
+        assert!(is_symmetric(&skin));
+    }
 
     #[test]
     fn corners_pair_up_across_the_plane_and_stay_within_it() {

@@ -4,6 +4,7 @@
 //! its triangles touch beyond common corners, none touches the skin, and a point of each part of the
 //! skin is inside. Exact predicates behind boxes; `n log n`.
 
+use super::report::least_angle;
 use crate::cage::Cage;
 use crate::geometry::bvh::Bvh;
 use crate::geometry::intersections::{neighbours_touch, triangles_touch};
@@ -110,6 +111,9 @@ pub(crate) fn first_outside(
     Some(tree.triangles()[near.triangle][0])
 }
 
+/// No quad is kept that a diagonal cuts into triangles with a smaller angle, in degrees.
+const NARROW: f64 = 6.0;
+
 /// Whether a quad may also be split by its other diagonal. `pieces`: its two triangles.
 pub(crate) fn splits_either_way(
     pieces: &[[u32; 3]],
@@ -122,10 +126,12 @@ pub(crate) fn splits_either_way(
     let outer = [[*b, *c, *d], [*b, *d, *a]];
     outer.iter().all(|t| {
         let [p, q, r] = t.map(|v| &cage[v as usize]);
-        let apart = faces.iter().all(|f| {
-            let of_quad = f.iter().all(|v| [*a, *b, *c, *d].contains(v));
-            of_quad || !neighbours_touch(cage, *t, *f)
-        });
+        let wide = least_angle(t.map(|v| cage[v as usize])) >= NARROW;
+        let apart = wide
+            && faces.iter().all(|f| {
+                let of_quad = f.iter().all(|v| [*a, *b, *c, *d].contains(v));
+                of_quad || !neighbours_touch(cage, *t, *f)
+            });
         let mut clear = apart;
         tree.in_box(&p.inf(q).inf(r), &p.sup(q).sup(r), |at| {
             clear = clear && !triangles_touch([p, q, r], triangles[at as usize].map(|v| &skin[v as usize]));
