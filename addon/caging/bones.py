@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 SAME = 1e-4  # ends nearer than this, of the size, are one node
 
+JOINED = 1e-3  # a child whose head is nearer to its parent's tail than this begins there
+FEW = 3  # bones with one child from which nothing is concluded
+AHEAD = 0.6  # of the way from the last joint but one to the last, a limb goes on beyond it
+
 
 @dataclass(frozen=True)
 class BoneGraph:
@@ -33,6 +37,11 @@ def bone_graph(
     names: list[str], parents: NDArray[np.int32], heads: Points, tails: Points, used: list[int]
 ) -> BoneGraph:
     """The graph of the `used` bones. What no parent joins to the rest is joined where it is nearest to it."""
+    above = _above(parents, used)
+    believed = _believed(above, heads[used], tails[used])
+    if not believed:
+        tails = tails.copy()
+        tails[used] = _tails(above, heads[used])
     ends = np.concatenate([heads[used], tails[used]])
     place = _merged(ends, SAME * float(np.linalg.norm(np.ptp(ends, axis=0))))
     kept, nodes = np.unique(place, return_inverse=True)
@@ -40,17 +49,60 @@ def bone_graph(
     graph = _Edges(ends[kept])
     for k, bone in enumerate(used):
         graph.add(head[k], tail[k], names[bone], link=False)
-    index = {bone: k for k, bone in enumerate(used)}
-    for k, bone in enumerate(used):
-        above = parents[bone]
-        while above >= 0 and above not in index:
-            above = parents[above]
-        if above >= 0:
-            graph.add(graph.nearest(head[k], [head[index[above]], tail[index[above]]]), head[k], names[bone], link=True)
-    graph.join_parts({int(head[k]): names[bone] for k, bone in reversed(list(enumerate(used)))})
+    for k, parent in enumerate(above):
+        if parent >= 0:
+            ends_above = [head[parent], tail[parent]] if believed else [head[parent]]
+            graph.add(graph.nearest(head[k], ends_above), head[k], names[used[k]], link=True)
+    graph.join_parts(
+        {int(node): names[bone] for k, bone in reversed(list(enumerate(used))) for node in (tail[k], head[k])}
+    )
     found = {names[bone]: (int(head[k]), int(tail[k])) for k, bone in enumerate(used)}
     edges = np.array(graph.edges, np.int64).reshape(-1, 2)
     return BoneGraph(graph.nodes, edges, graph.bones, np.array(graph.links, bool), found)
+
+
+def _above(parents: NDArray[np.int32], used: list[int]) -> list[int]:
+    """For each used bone the row of the nearest used one among its ancestors, -1 without one."""
+    row = {bone: k for k, bone in enumerate(used)}
+    found = []
+    for bone in used:
+        above = int(parents[bone])
+        while above >= 0 and above not in row:
+            above = int(parents[above])
+        found.append(row.get(above, -1))
+    return found
+
+
+def _children(above: list[int]) -> list[list[int]]:
+    return [[child for child, parent in enumerate(above) if parent == k] for k in range(len(above))]
+
+
+def _believed(above: list[int], heads: Points, tails: Points) -> bool:
+    """Whether tails mean something. Formats such as glTF have joints and no tails, and importers make some up: then the
+    only child of a bone seldom begins at its tail.
+    """
+    only = [(k, found[0]) for k, found in enumerate(_children(above)) if len(found) == 1]
+    size = float(np.linalg.norm(np.ptp(heads, axis=0))) if len(heads) else 0.0
+    joined = [np.linalg.norm(tails[k] - heads[child]) <= JOINED * size for k, child in only]
+    return len(joined) < FEW or 2 * sum(joined) >= len(joined)
+
+
+def _tails(above: list[int], heads: Points) -> Points:
+    """Tails from the heads alone: at the child that leads on straightest, or ahead where a limb ends."""
+    tails = heads.copy()
+    for k, children in enumerate(_children(above)):
+        ways = {child: _unit(heads[child] - heads[k]) for child in children}
+        onward = _unit(heads[k] - heads[above[k]]) if above[k] >= 0 else sum(ways.values(), np.zeros(3))
+        if ways:
+            tails[k] = heads[max(ways, key=lambda child: float(ways[child] @ onward))]
+        elif above[k] >= 0:
+            tails[k] = heads[k] + AHEAD * (heads[k] - heads[above[k]])
+    return tails
+
+
+def _unit(way: Points) -> Points:
+    length = float(np.linalg.norm(way))
+    return way / length if length > 0.0 else way
 
 
 def curve_graph(nodes: Points, edges: NDArray[np.int64]) -> BoneGraph:

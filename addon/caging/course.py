@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ..generator import Arc, Points
 from .bones import BoneGraph
 
+BEYOND = 100.0  # a node is no farther beyond a bone's tail, in lengths of the bone
+
 
 class Place(NamedTuple):
     """A place on the skeleton: so far along an arc."""
@@ -22,7 +24,9 @@ class Place(NamedTuple):
 
 
 class OnBone(NamedTuple):
-    """A place in the artist's terms: 0 at the bone's head, 1 at its tail; down to -1 on the way from its parent."""
+    """A place in the artist's terms: 0 at the bone's head, 1 at its tail, more beyond the last bone of a limb, and down
+    to -1 on the way from its parent.
+    """
 
     bone: str
     position: float
@@ -111,8 +115,9 @@ class Course:
         own = [piece for piece in self._pieces if piece.arc == place.arc]
         piece = min(own, key=lambda piece: _outside(place.along, piece.start, piece.end))
         span = piece.end - piece.start
-        share = float(np.clip((place.along - piece.start) / span if span else 0.0, 0.0, 1.0))
-        return OnBone(self.graph.bones[piece.edge], share - 1.0 if self.graph.links[piece.edge] else share)
+        link = bool(self.graph.links[piece.edge])
+        share = float(np.clip((place.along - piece.start) / span if span else 0.0, 0.0, 1.0 if link else BEYOND))
+        return OnBone(self.graph.bones[piece.edge], share - 1.0 if link else share)
 
     def find(self, on_bone: OnBone) -> Place | None:
         """The place of a position on a bone; None where the skeleton has no such bone."""
@@ -121,9 +126,10 @@ class Course:
         link, share = on_bone.position < 0.0, on_bone.position % 1.0 if on_bone.position < 0.0 else on_bone.position
         for piece in self._pieces:
             if self.graph.bones[piece.edge] == on_bone.bone and bool(self.graph.links[piece.edge]) == link:
-                return Place(piece.arc, piece.start + share * (piece.end - piece.start))
+                along = piece.start + share * (piece.end - piece.start)
+                return Place(piece.arc, float(np.clip(along, 0.0, self.along[piece.arc][-1])))
         head, tail = self.graph.nodes[list(self.graph.ends[on_bone.bone])]
-        return self.nearest(head + max(on_bone.position, 0.0) * (tail - head))
+        return self.nearest(head + float(np.clip(on_bone.position, 0.0, 1.0)) * (tail - head))
 
     def kept(self, place: Place) -> Place:
         """The place as a file keeps it, so that opened again it is the same."""

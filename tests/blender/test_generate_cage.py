@@ -444,6 +444,24 @@ def test_bones_outside_are_refused(character: RigObjects) -> None:
     assert state() == before
 
 
+def test_made_up_tails_of_joints_are_not_believed(caging: ModuleType) -> None:
+    heads = np.array([[0.0, 0, 0], [0, 0, 1], [0, 0, 2], [1, 0, 2], [0, 0, 3], [0, 0, 4]])
+    parents = np.array([-1, 0, 1, 2, 2, 4], np.int32)
+    names = list("abcdef")
+
+    def ways(tails: Points) -> dict[str, Points]:
+        graph = caging.character.bone_graph(names, parents, heads, tails, list(range(6)))
+        assert len(graph.edges) == len(graph.nodes) - 1, "a tree"
+        return {name: graph.nodes[tail] - graph.nodes[head] for name, (head, tail) in graph.ends.items()}
+
+    sideways = ways(heads + np.array([0, 5, 0]))
+    assert np.array_equal(sideways["c"], [0, 0, 1]), "to the child that leads on straightest"
+    assert np.allclose(sideways["f"], [0, 0, 0.6]), "the last one straight ahead"
+    assert np.allclose(sideways["d"], [0.6, 0, 0])
+    joined = ways(np.array([[0, 0, 1], [0, 0, 2], [0, 0, 2.5], [1, 0, 2.5], [0, 0, 4], [0, 0, 5]]))
+    assert np.allclose(joined["c"], [0, 0, 0.5]), "tails that bones begin at stay"
+
+
 def test_a_fault_at_a_bone_names_and_selects_it(character: RigObjects, caging: ModuleType) -> None:
     import bl_ext.user_default.cage_rig.generator as generator
 
