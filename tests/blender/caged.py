@@ -170,8 +170,8 @@ def is_symmetric(skins: list[bpy.types.Object], armature: bpy.types.Object | Non
     middle = [0.5 * (skin[:, 0].min() + skin[:, 0].max()), 0, 0]
     size = float(np.linalg.norm(np.ptp(skin, axis=0)))
     bones = [] if armature is None else [bone for bone in armature.data.bones if bone.use_deform]
-    heads = np.array([bone.head_local for bone in bones]).reshape(-1, 3)
-    return _mirrored((skin - middle) / size, 1e-5) and _mirrored((heads - middle) / size, 0.01)
+    ends = np.array([end for bone in bones for end in (bone.head_local, bone.tail_local)]).reshape(-1, 3)
+    return _mirrored((skin - middle) / size, 1e-5) and _mirrored((ends - middle) / size, 0.01)
 
 
 def _mirrored(points: np.ndarray, near: float) -> bool:

@@ -101,7 +101,9 @@ def test_a_kept_generator_answers_as_a_new_one(tube):
 def test_a_skin_without_an_armature_gets_a_skeleton(tube):
     skin, faces, _, _ = tube
     nodes, edges = core.extract_skeleton(skin, faces)
-    assert np.abs(nodes[:, 1:]).max() < 0.2
+    inner = (nodes[:, 0] > 1) & (nodes[:, 0] < 9)  # its ends may lead into corners
+    assert np.count_nonzero(inner) >= 2
+    assert np.abs(nodes[inner, 1:]).max() < 0.2
     vertices, _, report = core.generate_cage(skin, faces, nodes, edges)
     assert len(vertices) == 4 * len(report["sections"])
     assert report["genus"] == 0

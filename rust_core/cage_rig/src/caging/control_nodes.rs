@@ -7,6 +7,7 @@
 
 use super::skeleton::{climb, Arc, CurveSkeleton};
 use super::skin::Skin;
+use super::symmetry::image;
 use super::tips::THIN;
 use crate::error::CagingError;
 use crate::points::{first_unusable, Point};
@@ -70,6 +71,7 @@ pub(crate) fn control_nodes(
         let leaf = arc.ends.map(|e| skeleton.junctions[e].degree == 1);
         let mut places = match bending {
             Some(_) => given[at].clone(),
+            None if skin.symmetric => even(arc, placed(skin, skeleton, at, placement)),
             None => placed(skin, skeleton, at, placement),
         };
         places.sort_by(f64::total_cmp);
@@ -131,6 +133,23 @@ fn leaf_node(skin: &Skin, arc: &Arc, at: usize, side: usize, neighbour: Option<f
         radius,
         node: nearest_node(arc, from_tip(0.0)),
     }
+}
+
+/// Places on an arc that crosses the plane of symmetry and is its own image: those of its first half,
+/// and their images.
+fn even(arc: &Arc, places: Vec<f64>) -> Vec<f64> {
+    let length = arc.length();
+    let is_own_image = (0..=8).all(|k| {
+        let s = length * f64::from(k) / 8.0;
+        (image(&arc.at(s)) - arc.at(length - s)).norm() < 1e-6
+    });
+    if !is_own_image || arc.at(0.0).x.abs() < 1e-6 {
+        return places;
+    }
+    let gap = 0.45 * arc.radius_at(0.5 * length);
+    let half: Vec<f64> = places.iter().copied().filter(|s| *s < 0.5 * length - gap).collect();
+    let middle = places.iter().any(|s| (s - 0.5 * length).abs() <= gap).then_some(0.5 * length);
+    half.iter().copied().chain(middle).chain(half.iter().map(|s| length - s)).collect()
 }
 
 /// Bending nodes of an arc without the user.

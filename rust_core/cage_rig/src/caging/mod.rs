@@ -344,6 +344,7 @@ impl Generator {
             return Polygons::from_triangles(&triangles);
         }
         let tree = crate::geometry::bvh::Bvh::new(&self.skin.original, &self.skin.triangles);
+        let clear = 0.5 * self.options.inflation.clearance * self.skin.space.size;
         let mut faces = Polygons::default();
         for polygon in &scaffold.polygons {
             let pieces = tubes::split(&scaffold.corners, polygon);
@@ -353,7 +354,7 @@ impl Generator {
                     vertices,
                     &triangles,
                     (&self.skin.original, &self.skin.triangles),
-                    &tree,
+                    (&tree, clear),
                 );
             if whole {
                 // Starts where a fan gives the verified triangles.

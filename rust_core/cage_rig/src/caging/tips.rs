@@ -42,10 +42,11 @@ pub(super) fn unfold(skin: &Skin, graph: &mut Graph) {
 /// Leads every end of the skeleton on to where its limb is thin.
 pub(super) fn lead_on(skin: &Skin, skeleton: &mut CurveSkeleton) {
     for k in 0..skeleton.arcs.len() {
-        for side in 0..2 {
+        // Both ends of the arc as it was: neither is thin by what the other added.
+        let found = [0, 1].map(|side| beyond(skin, &skeleton.arcs[k], side));
+        for (side, found) in found.into_iter().enumerate() {
             let junction = skeleton.arcs[k].ends[side];
             if skeleton.junctions[junction].degree == 1 {
-                let found = beyond(skin, &skeleton.arcs[k], side);
                 if let Some((tip, radius)) = found.last() {
                     (skeleton.junctions[junction].point, skeleton.junctions[junction].radius) =
                         (*tip, *radius);

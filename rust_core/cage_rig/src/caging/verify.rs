@@ -114,36 +114,65 @@ pub(crate) fn first_outside(
 /// No quad is kept that a diagonal cuts into triangles with a smaller angle, in degrees.
 const NARROW: f64 = 6.0;
 
-/// Whether a quad may also be split by its other diagonal. `pieces`: its two triangles.
+/// Whether a quad may also be split by its other diagonal, `clear` of the skin. `pieces`: its two
+/// triangles; `tree`: of the skin.
 pub(crate) fn splits_either_way(
     pieces: &[[u32; 3]],
     cage: &[Point],
     faces: &[[u32; 3]],
     (skin, triangles): (&[Point], &[[u32; 3]]),
-    tree: &Bvh,
+    (tree, clear): (&Bvh, f64),
 ) -> bool {
     let [[a, b, c], [_, _, d]] = pieces else { return false };
     let outer = [[*b, *c, *d], [*b, *d, *a]];
-    outer.iter().all(|t| {
-        let [p, q, r] = t.map(|v| &cage[v as usize]);
-        let wide = least_angle(t.map(|v| cage[v as usize])) >= NARROW;
-        let apart = wide
+    let own = Bvh::new(cage, &outer);
+    let fits = |t: &[u32; 3]| {
+        let corners = t.map(|v| cage[v as usize]);
+        let [p, q, r] = &corners;
+        let mut fits = least_angle(corners) >= NARROW
             && faces.iter().all(|f| {
                 let of_quad = f.iter().all(|v| [*a, *b, *c, *d].contains(v));
                 of_quad || !neighbours_touch(cage, *t, *f)
             });
-        let mut clear = apart;
-        tree.in_box(&p.inf(q).inf(r), &p.sup(q).sup(r), |at| {
-            clear = clear && !triangles_touch([p, q, r], triangles[at as usize].map(|v| &skin[v as usize]));
+        let margin = Point::repeat(clear);
+        tree.in_box(&(p.inf(q).inf(r) - margin), &(p.sup(q).sup(r) + margin), |at| {
+            let corners = triangles[at as usize].map(|v| &skin[v as usize]);
+            let near = |x: &&Point| own.nearest(cage, x).is_some_and(|n| n.distance < clear);
+            fits = fits && !corners.iter().any(near) && !triangles_touch([p, q, r], corners);
         });
-        clear
-    })
+        fits
+    };
+    outer.iter().all(fits) && edge_is_clear([&cage[*b as usize], &cage[*d as usize]], skin, tree, clear)
+}
+
+/// Whether no point of an edge is nearer to the skin than `clear`. Each step is as long as the gap
+/// allows.
+fn edge_is_clear([p, q]: [&Point; 2], skin: &[Point], tree: &Bvh, clear: f64) -> bool {
+    let (way, mut t) = (q - p, 0.0);
+    let length = way.norm().max(1e-300);
+    while t < 1.0 {
+        let gap = tree.nearest(skin, &(p + way * t)).map_or(f64::INFINITY, |n| n.distance) - clear;
+        if gap < 0.0 {
+            return false;
+        }
+        t += gap.max(0.01 * clear) / length;
+    }
+    true
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixtures::shapes::icosphere;
+
+    #[test]
+    fn an_edge_past_a_ball_is_clear_by_its_distance() {
+        let (skin, triangles) = ball(1.0, 0.0);
+        let tree = Bvh::new(&skin, &triangles);
+        let ends = [Point::new(-2.0, 1.1, 0.0), Point::new(2.0, 1.1, 0.0)];
+        assert!(edge_is_clear([&ends[0], &ends[1]], &skin, &tree, 0.05));
+        assert!(!edge_is_clear([&ends[0], &ends[1]], &skin, &tree, 0.25));
+    }
 
     fn ball(radius: f64, shift: f64) -> (Vec<Point>, Vec<[u32; 3]>) {
         let (points, triangles) = icosphere(1);
