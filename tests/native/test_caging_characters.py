@@ -70,3 +70,15 @@ def test_sections_of_a_character_are_distinct_and_mirrored():
     images = middles * [-1, 1, 1] + [skin[:, 0].min() + skin[:, 0].max(), 0, 0]
     nearest = np.linalg.norm(images[:, None] - middles[None], axis=2).min(axis=1)
     assert nearest.max() < 1e-6
+
+
+def test_a_node_that_is_moved_still_gives_a_cage():
+    skin, faces, nodes, edges = load("human_2k_53b")
+    generator = core.CageGenerator(skin, faces, nodes, edges, options={"triangles": True})
+    bending = [section for section in generator.sections() if section["kind"] == "bending"]
+    points = np.array([section["point"] for section in bending])
+    for at, way in ((0, 0.3), (len(bending) // 3, -0.3), (2 * len(bending) // 3, 0.3)):
+        moved = points.copy()
+        moved[at] += way * bending[at]["radius"] * bending[at]["direction"]
+        vertices, triangles, report = generator.generate(moved).result()
+        check(skin, vertices, triangles, report)
