@@ -232,7 +232,7 @@ class CageRigBendingNode(bpy.types.PropertyGroup):
     name: StringProperty(name="Bone")
     position: FloatProperty(
         name="Position",
-        description="Along the bone: 0 at its head, 1 at its tail, more beyond it, down to -1 on the way from its parent",
+        description="Along the bone: 0 at its head, 1 at its tail, more beyond; down to -1 on the way from its parent",
     )
 
 
