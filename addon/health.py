@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import layers, linked, migration
+from . import layers, linked
 from .adapters import armature, modifier, positions, stack
 
 
@@ -26,10 +26,7 @@ class Problem(str):
 
 def problem(cage: bpy.types.Object) -> str:
     """Why the rig can't run and what to do, as a `Problem` where a button can help, or an empty string."""
-    settings = cage.cage_rig
-    if settings.version > migration.VERSION:
-        return f"'{cage.name}' was bound with a newer Cage Rig; update the extension"
-    posed = settings.posed_cage
+    posed = cage.cage_rig.posed_cage
     if posed is not None and posed.cage_rig.owner != cage:
         return f"'{cage.name}' is a copy of cage '{_name(posed.cage_rig.owner)}'; bind it to skins and bones of its own"
     return (
@@ -143,8 +140,8 @@ def _skins_problem(cage: bpy.types.Object) -> str:
             return Problem(f"The Cage Rig modifier of '{obj.name}' was removed; undo, or press Rebind", "rebind")
         if obj.override_library is not None and not modifier.is_whole(obj):
             return (
-                f"'{obj.name}' was bound with an older Cage Rig in another file; open and save that file, then reload "
-                "it here (Outliner, Blender File, Libraries)"
+                f"The Cage Rig modifier of '{obj.name}' is damaged in another file; open and save that file, then "
+                "reload it here (Outliner, Blender File, Libraries)"
             )
         blocking = stack.blocking(obj, stack.first(obj))
         if blocking:

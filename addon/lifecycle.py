@@ -156,7 +156,7 @@ def _write_bind(
 
 def _plan_rebind(context: bpy.types.Context, cage: bpy.types.Object) -> _Plan:
     settings = cage.cage_rig
-    _refuse_override(cage)
+    _refuse_foreign(cage)
     if settings.armature is None or not settings.armature.users_collection:
         raise BindError(f"The armature of '{cage.name}' was deleted; undo, or Unbind and bind with another")
     if settings.posed_cage is not None and settings.posed_cage.cage_rig.owner != cage:
@@ -198,7 +198,7 @@ def use_coordinates(context: bpy.types.Context, cage: bpy.types.Object, known: K
     `source` is what the artist is told of them. Raises `BindError`, with nothing changed, where it can't.
     """
     settings = cage.cage_rig
-    _refuse_override(cage)
+    _refuse_foreign(cage)
     if settings.snapshot is None or any(skin.snapshot is None for skin in settings.skins):
         raise BindError(f"What was bound of '{cage.name}' is lost; press Rebind")
     try:
@@ -236,7 +236,7 @@ def unbind(cage: bpy.types.Object) -> None:
     Raises `BindError`, with nothing changed, for a rig of another file.
     """
     settings = cage.cage_rig
-    _refuse_override(cage)
+    _refuse_foreign(cage)
     sync.drop(cage)
     owned = settings.posed_cage is None or settings.posed_cage.cage_rig.owner == cage
     for upper in [obj for obj in bpy.data.objects if obj.cage_rig.input == cage]:
@@ -357,9 +357,12 @@ def _rig_below(armature_object: bpy.types.Object, skins: tuple[bpy.types.Object,
     return lower
 
 
-def _refuse_override(cage: bpy.types.Object) -> None:
+def _refuse_foreign(cage: bpy.types.Object) -> None:
     if cage.library is not None or cage.override_library is not None:
         raise BindError(f"'{cage.name}' was bound in another file; open that one to bind anew, or delete it here")
+    trouble = migration.problem(cage)
+    if trouble:
+        raise BindError(trouble)
 
 
 def _read(

@@ -17,13 +17,31 @@ from .adapters import armature, modifier, positions
 VERSION = 2
 
 
+def problem(cage: bpy.types.Object) -> str:
+    """Why this version can't take the rig in the form that it has, or an empty string. Then it is left as it is."""
+    settings, home = cage.cage_rig, _home(cage)
+    if settings.version > VERSION:
+        return f"'{cage.name}' was bound with a newer Cage Rig; update the extension"
+    if settings.version < VERSION and home is not None:
+        return (
+            f"'{cage.name}' was bound with an older Cage Rig in '{home.filepath}'; open and save that file, then "
+            "reload it here (Outliner, Blender File, Libraries)"
+        )
+    return ""
+
+
+def _home(obj: bpy.types.Object) -> bpy.types.Library | None:
+    """The file that has the object; None where that is this one."""
+    return obj.library if obj.override_library is None else obj.override_library.reference.library
+
+
 def migrate(cage: bpy.types.Object) -> None:
-    """Bring a rig of this file to the present form. What is of another file stays, see `linked`."""
+    """Bring a rig without a `problem` to the present form. What is of another file stays, see `linked`."""
     settings = cage.cage_rig
     for skin in layers.skins_of(cage):
-        if skin.library is None and skin.override_library is None:
+        if skin.library is None:
             modifier.renew(skin)
-    if settings.version >= VERSION or cage.library is not None or cage.override_library is not None:
+    if settings.version >= VERSION or _home(cage) is not None:
         return
     posed, bones = settings.posed_cage, settings.armature
     if posed is not None and posed.type == "MESH" and bones is not None and posed.library is None:

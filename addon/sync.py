@@ -200,6 +200,10 @@ def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> boo
     """Whether the rig can run; where it can't it is paused, or nobody sees it."""
     if cage.library is not None and not cage.evaluated_get(depsgraph).is_evaluated:
         return False  # what a library override was made from
+    trouble = migration.problem(cage)
+    if trouble:
+        _pause(cage, trouble)
+        return False
     if cage.session_uid not in _running or cage.cage_rig.state == "PAUSED":
         migration.migrate(cage)
     if linked.adopt(cage):

@@ -23,7 +23,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "layers": ({"bpy"}, {"adapters"}),
     "linked": ({"bpy"}, {"adapters"}),
     "registry": ({"bpy"}, {"adapters", "layers"}),
-    "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked", "migration"}),
+    "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked"}),
     "glance": ({"bpy", "numpy"}, {"adapters", "health"}),
     "migration": ({"bpy"}, {"adapters", "binding", "layers"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),

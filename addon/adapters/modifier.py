@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .. import compat
 from . import positions
-from .node_group import ATTRIBUTE, INDEX, INPUT, NAME, SOCKETS, identifier, is_current, node_group
+from .node_group import ATTRIBUTE, INDEX, INPUT, NAME, complete, identifier, is_current, node_group
 from .positions import Points
 
 
@@ -66,16 +66,15 @@ def add(skin: bpy.types.Object, rest_cage: bpy.types.Object, posed_cage: bpy.typ
 
 
 def renew(skin: bpy.types.Object) -> None:
-    """Give modifiers of ours whose node group lacks inputs a whole one, with the values that they have."""
+    """Make the node groups of our modifiers whole where they lack inputs; the values that modifiers have stay.
+
+    A group of another file stays as it is.
+    """
     for modifier in ours(skin):
         group = modifier.node_group
-        if not is_current(group):
-            values = {name: read(modifier, name) for name in SOCKETS if read(modifier, name) is not None}
-            modifier.node_group = node_group()
+        if group.library is None and group.override_library is None and not is_current(group):
+            complete(group)
             modifier.show_in_editmode = False
-            set_inputs(modifier, values)
-            if group.users == 0 and group.library is None:
-                bpy.data.node_groups.remove(group)
 
 
 def is_whole(skin: bpy.types.Object) -> bool:

@@ -41,10 +41,24 @@ def node_group() -> bpy.types.NodeTree:
     group.is_modifier = True
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    for name, kind in SOCKETS.items():
-        group.interface.new_socket(name, in_out="INPUT", socket_type=kind)
-    _Builder(group).build()
+    complete(group)
     return group
+
+
+def complete(group: bpy.types.NodeTree) -> None:
+    """Give a group of ours all its inputs and nodes. Those inputs that it has stay, with the values in modifiers.
+
+    They have to: Blender crashes where a library override of a modifier finds another type behind an identifier.
+    """
+    kinds = {name: kind for name, _, kind in _inputs(group)}
+    for item in list(group.interface.items_tree):
+        if item.name in SOCKETS and kinds.get(item.name) != SOCKETS[item.name]:
+            group.interface.remove(item)
+    for name, kind in SOCKETS.items():
+        if kinds.get(name) != kind:
+            group.interface.new_socket(name, in_out="INPUT", socket_type=kind)
+    group.nodes.clear()
+    _Builder(group).build()
 
 
 def is_current(group: bpy.types.NodeTree) -> bool:

@@ -203,3 +203,18 @@ def fresh(rig: Rig) -> list[Points]:
     sync.restored()
     update()
     return [shown(skin) for skin in rig.skins]
+
+
+@contextmanager
+def unwatched() -> Iterator[None]:
+    """Cage Rig's handlers are silent: what is done to a file meanwhile, nobody mends or refuses."""
+    handlers = bpy.app.handlers
+    names = ("depsgraph_update_post", "frame_change_post", "load_post", "save_pre", "undo_post", "redo_post")
+    before = {name: list(getattr(handlers, name)) for name in names}
+    for name in names:
+        getattr(handlers, name).clear()
+    try:
+        yield
+    finally:
+        for name, found in before.items():
+            getattr(handlers, name)[:] = found
