@@ -20,7 +20,7 @@ HEAD = """# Figures
 
 Measured by `make bench` on {machine} ({cores} cores). Every row takes turns with what it stands beside, in one process
 on the same meshes, and its time is the least of many rounds; every scenario checks its answer. *Bandwidth* is the part
-of the speed at which memory can be read, measured beside it.
+of the speed at which memory can be read, measured beside it; *cached*: ours was faster, from a cache.
 
 ![Times faster than what would be used instead](bench.png)
 """

@@ -61,9 +61,17 @@ def table(rows: list[Row]) -> str:
     for row in rows:
         peer = "–" if row.peer is None else _number(row.peer)
         ratio = "–" if row.peer is None else f"{row.peer / row.ours:.1f}"
-        limit = "–" if row.limit is None else f"{100 * min(row.limit, 1.0):.0f} %"
-        lines.append(f"| {row.scenario} | {_number(row.ours)} | {peer} | {ratio} | {limit} | {row.beside or '–'} |")
+        lines.append(
+            f"| {row.scenario} | {_number(row.ours)} | {peer} | {ratio} | {_share(row.limit)} | {row.beside or '–'} |"
+        )
     return "\n".join(lines)
+
+
+def _share(limit: float | None) -> str:
+    """The part of the bandwidth that was reached; more than all of it says that a cache was read, and no memory."""
+    if limit is None:
+        return "–"
+    return "cached" if limit > 1.0 else f"{100 * limit:.0f} %"
 
 
 def _number(milliseconds: float) -> str:
