@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
-import bpy
-from stage import Cast
-
+from blend_fixtures import uncaged
 from blend_fixtures.arm import arm
 from blend_fixtures.biped import biped
-from blend_fixtures.build import build_character
 from blend_fixtures.octopus import octopus
-from blend_fixtures.parts import Character
+from blend_fixtures.uncaged import Uncaged
 
-ROOT = Path(__file__).parent.parent.parent
-BESIDE = Path(os.environ.get("CAGE_RIG_SHARED") or ROOT.parent / "shared") / "data" / "characters"
 ROUND = (30.0, 25.0)
 LOOKS = {  # degrees around the character, and from above; from the front where nothing is said
     "octopus": ROUND,
@@ -46,33 +39,18 @@ BENDS = {  # by the picture's name
 }
 
 
-def everyone() -> dict[str, Callable[[], Cast]]:
-    found = {make.__name__: _built(make) for make in (arm, biped, octopus)}
-    for path in sorted([*BESIDE.glob("*.glb"), *BESIDE.glob("*.obj")]):
-        found[path.stem] = _imported(path)
-    return found
+def everyone() -> dict[str, Callable[[], Uncaged]]:
+    found = {make.__name__: uncaged.built(make) for make in (arm, biped, octopus)}
+    return found | {name: _in_grey(build) for name, build in sorted(uncaged.beside().items())}
 
 
-def _built(make: Callable[[], Character]) -> Callable[[], Cast]:
-    def build() -> Cast:
-        rig = build_character(make())
-        bpy.data.objects.remove(rig.cage)
-        return rig.skins, rig.armature
+def _in_grey(build: Callable[[], Uncaged]) -> Callable[[], Uncaged]:
+    """Without the materials that the file has."""
 
-    return build
-
-
-def _imported(path: Path) -> Callable[[], Cast]:
-    """By Blender's importers, vertices welded."""
-
-    def build() -> Cast:
-        if path.suffix == ".obj":
-            bpy.ops.wm.obj_import(filepath=str(path))
-            return [obj for obj in bpy.data.objects if obj.type == "MESH"], None
-        bpy.ops.import_scene.gltf(filepath=str(path), merge_vertices=True)
-        skins = [obj for obj in bpy.data.objects if any(mod.type == "ARMATURE" for mod in obj.modifiers)]
+    def made() -> Uncaged:
+        skins, armature = build()
         for skin in skins:
             skin.data.materials.clear()
-        return skins, next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+        return skins, armature
 
-    return build
+    return made

@@ -15,6 +15,7 @@ from mathutils import Matrix, Vector
 from stage import LOOK
 
 from blend_fixtures.build import add_shape_key
+from blend_fixtures.uncaged import Uncaged
 
 Acts = Iterator[float | None]
 
@@ -27,7 +28,7 @@ def everyone() -> Acts:
             yield from one_of_gallery(name, build)
 
 
-def one_of_gallery(name: str, build: Callable[[], stage.Cast]) -> Acts:
+def one_of_gallery(name: str, build: Callable[[], Uncaged]) -> Acts:
     skins, armature = stage.start_with(build)
     yield LOOK
     caging, cages = sys.modules["bl_ext.user_default.cage_rig"].caging, {}

@@ -13,9 +13,9 @@ import numpy as np
 from mathutils import Euler
 
 from blend_fixtures.build import RigObjects, build_biped
+from blend_fixtures.uncaged import Uncaged
 
 Box = tuple[int, int, int, int]  # left, bottom, right, top in window pixels
-Cast = tuple[list[bpy.types.Object], bpy.types.Object | None]  # skins, and their armature
 CUT = driver.OUT / "cut"
 LOOK = 1.0  # seconds until the window shows what was done
 GROUND = 0.02  # differences below this are one colour
@@ -35,7 +35,7 @@ def start(build: Callable[[], RigObjects] = build_biped, *, bind: bool = True, f
     return rig
 
 
-def start_with(build: Callable[[], Cast]) -> Cast:
+def start_with(build: Callable[[], Uncaged]) -> Uncaged:
     """A fresh scene with skins and perhaps their armature, at rest, seen from the front; the sidebar closed."""
     _clear()
     skins, armature = build()

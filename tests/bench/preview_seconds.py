@@ -13,9 +13,12 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import bpy
 from bl_ext.user_default.cage_rig import caging, reading
+
+from blend_fixtures import uncaged
 
 spent: dict[str, float] = {}
 
@@ -28,9 +31,7 @@ def timed(name: str) -> Iterator[None]:
 
 
 def main() -> None:
-    bpy.ops.import_scene.gltf(filepath=sys.argv[1], merge_vertices=True)
-    skins = [obj for obj in bpy.data.objects if any(mod.type == "ARMATURE" for mod in obj.modifiers)]
-    armature = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    skins, armature = uncaged.imported(Path(sys.argv[1]))()
     options = caging.Options()
     with timed("read"):
         reading.read(bpy.context, armature, skins)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from pathlib import Path
 
 import bpy
 import cage_rig_core as core
@@ -16,57 +14,20 @@ from blend_fixtures import rigs
 from blend_fixtures.arm import arm
 from blend_fixtures.bar import bar
 from blend_fixtures.biped import biped
-from blend_fixtures.build import build_character
 from blend_fixtures.octopus import octopus
-from blend_fixtures.parts import Character
 from blend_fixtures.small import capsule, simple_bar, two_roots, two_skins
+from blend_fixtures.uncaged import Uncaged, built, without_cage
 
-SHARED = Path(os.environ.get("CAGE_RIG_SHARED") or Path(__file__).resolve().parents[3] / "shared")
-FOLDER = SHARED / "data" / "characters"
 FIXTURES = (arm, bar, biped, octopus, capsule, simple_bar, two_roots, two_skins)
-Made = tuple[list[bpy.types.Object], bpy.types.Object | None]
 
 
-def built(make: Callable[[], Character]) -> Callable[[], Made]:
-    def build() -> Made:
-        found = build_character(make())
-        bpy.data.objects.remove(found.cage)
-        return found.skins, found.armature
-
-    return build
+def rigged(name: str) -> Callable[[], Uncaged]:
+    return without_cage(lambda: rigs.build_rig(name))
 
 
-def rigged(name: str) -> Callable[[], Made]:
-    def build() -> Made:
-        found = rigs.build_rig(name)
-        bpy.data.objects.remove(found.cage)
-        return found.skins, found.armature
-
-    return build
-
-
-def imported(path: Path) -> Callable[[], Made]:
-    """As Blender's importers make it, vertices welded."""
-
-    def build() -> Made:
-        if path.suffix == ".obj":
-            bpy.ops.wm.obj_import(filepath=str(path))
-            return [obj for obj in bpy.data.objects if obj.type == "MESH"], None
-        bpy.ops.import_scene.gltf(filepath=str(path), merge_vertices=True)
-        skins = [obj for obj in bpy.data.objects if any(mod.type == "ARMATURE" for mod in obj.modifiers)]
-        return skins, next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
-
-    return build
-
-
-def every_fixture() -> dict[str, Callable[[], Made]]:
+def every_fixture() -> dict[str, Callable[[], Uncaged]]:
     found = {make.__name__: built(make) for make in FIXTURES}
     return found | {name: rigged(name) for name in rigs.RIGS}
-
-
-def every_shared() -> dict[str, Callable[[], Made]]:
-    paths = [path for kind in ("*.glb", "*.obj") for path in sorted(FOLDER.glob(kind))]
-    return {path.stem: imported(path) for path in paths}
 
 
 def inside_of(space: np.ndarray, obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:

@@ -21,10 +21,10 @@ import truth
 from mathutils import Quaternion
 from scene import Rig, bind, fat_key, rest, select, set_mesh, shown, update
 
+from blend_fixtures import uncaged
 from blend_fixtures.build import RigObjects, add_cage
 
 ROOT = Path(__file__).parents[2]
-CHARACTERS = ROOT.parent / "shared" / "data" / "characters"
 LARGE = 2_000_000  # bytes
 LARGE_ASKED = "CAGE_RIG_LARGE_CHARACTERS"
 
@@ -37,9 +37,9 @@ def rigged(path: Path) -> bool:
 
 
 def characters() -> list[object]:
-    found = [path for path in sorted(CHARACTERS.glob("*.glb")) if rigged(path)]
+    found = [path for path in sorted(uncaged.FOLDER.glob("*.glb")) if rigged(path)]
     if not found:
-        return [pytest.param(None, marks=pytest.mark.skip(reason=f"no rigged characters in {CHARACTERS}"))]
+        return [pytest.param(None, marks=pytest.mark.skip(reason=f"no rigged characters in {uncaged.FOLDER}"))]
     large = pytest.mark.skipif(LARGE_ASKED not in os.environ, reason=f"large; set {LARGE_ASKED} to run it")
     return [pytest.param(path, id=path.stem, marks=large if path.stat().st_size > LARGE else ()) for path in found]
 
@@ -152,9 +152,9 @@ def as_fbx(path: Path, folder: Path) -> Path:
 @pytest.mark.parametrize("importer", ["import_scene.fbx", "wm.fbx_import"])
 @pytest.mark.parametrize("name", ["fox_576_24b", "human_2k_53b"])
 def test_a_real_character_comes_through_fbx(name: str, importer: str, load: object, tmp_path: Path) -> None:
-    path = CHARACTERS / f"{name}.glb"
+    path = uncaged.FOLDER / f"{name}.glb"
     if not path.is_file():
-        pytest.skip(f"{path.name} is not in {CHARACTERS}")
+        pytest.skip(f"{path.name} is not in {uncaged.FOLDER}")
     if importer.startswith("wm") and bpy.app.version < (4, 5):
         pytest.skip("Blender has that importer from 4.5 on")
     rig = bind(load(as_fbx(path, tmp_path), importer))

@@ -13,7 +13,7 @@ import bpy
 import caged
 import pytest
 
-from blend_fixtures import rigs
+from blend_fixtures import rigs, uncaged
 
 QUICK = ("human_2k_53b", "fox_576_24b", "proc_airplane", "spot_unrigged")
 LARGE_ASKED = "CAGE_RIG_LARGE_CHARACTERS"
@@ -42,9 +42,9 @@ def known(request: pytest.FixtureRequest) -> None:
 
 
 def shared() -> list[object]:
-    found = caged.every_shared()
+    found = uncaged.beside()
     if not found:
-        return [pytest.param("", marks=pytest.mark.skip(reason=f"no characters in {caged.FOLDER}"))]
+        return [pytest.param("", marks=pytest.mark.skip(reason=f"no characters in {uncaged.FOLDER}"))]
     slow = pytest.mark.skipif(LARGE_ASKED not in os.environ, reason=f"large; set {LARGE_ASKED} to run it")
     return [pytest.param(name, marks=() if name in QUICK else slow) for name in found]
 
@@ -81,4 +81,4 @@ def test_a_character_of_the_project_is_caged(caging: ModuleType, name: str) -> N
 @PLACEMENTS
 @pytest.mark.parametrize("name", shared())
 def test_a_shared_character_is_caged(caging: ModuleType, name: str, placement: str) -> None:
-    check(caging, caged.every_shared()[name](), placement)
+    check(caging, uncaged.beside()[name](), placement)
