@@ -36,7 +36,7 @@ def acts() -> Iterator[float | None]:
     driver.install()
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
-    cage = box_cage(list(np.linspace(-1.15, 1.15, 30)), half=0.28)
+    cage = box_cage(list(np.linspace(-1.15, 1.15, 90)), half=0.28)
     objects = build_character(replace(bar(segments=830, across=60), cage=cage, shape_keys={}))
     yield 1.0
     driver.look_from_front([*objects.skins, objects.cage])
