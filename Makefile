@@ -78,6 +78,7 @@ pictures: $(VENV)/.extension
 
 listing: $(VENV)/.extension
 	$(PY) tools/with_extension.py docs/make_pictures/listing_renders.py
+	$(PY) docs/make_pictures/make_pictures.py listing
 
 $(VENV)/.dev: pyproject.toml
 	@test -n "$(PYTHON)" || { sh tools/find-python; exit 1; }
