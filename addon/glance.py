@@ -8,12 +8,13 @@ done at every edit; a frame alone changes none of it, but scripts may have, so w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import health
+from . import health, session
 from .adapters import armature, modifier, positions, stack
 
 
@@ -23,7 +24,7 @@ class Bones:
 
     pose_order: NDArray[np.int64] | None  # #J, among `pose.bones`; None: as they are
     rest: NDArray[np.float64]  # #J by 4 by 4
-    inverse: NDArray[np.float64]
+    core: Any  # the same, the core's
     heads: NDArray[np.float64]  # #J by 3
 
 
@@ -33,8 +34,8 @@ def read_bones(cage: bpy.types.Object, evaluated: bpy.types.Object, known: Bones
     rest = armature.read_rest_matrices(evaluated.data)[rest_order]
     as_they_are = np.array_equal(pose_order, np.arange(len(evaluated.pose.bones)))
     same = known is not None and np.array_equal(known.rest, rest)
-    inverse = known.inverse if same else np.linalg.inv(rest)
-    return Bones(None if as_they_are else pose_order, rest, inverse, rest[:, :3, 3].copy())
+    core = known.core if same else session.bones(rest)
+    return Bones(None if as_they_are else pose_order, rest, core, rest[:, :3, 3].copy())
 
 
 def seen(cage: bpy.types.Object) -> tuple[object, ...] | None:

@@ -109,15 +109,12 @@ class Session:
         self.rig = cage_rig_core.CoupledRig(**_to_core(snapshot)) if job is None else job.result()
         self.influence = 1.0
         self.revision = 0  # grows whenever a result may have changed
-        self._links = _tail_links(snapshot)
-        self._lengths = np.maximum(np.linalg.norm(snapshot.tails - snapshot.heads, axis=1), 1e-12)
         self._buffers = [np.empty((count, 3), np.float32) for count in counts]
         self._offsets: list[Points | None] = [None] * len(skins)
         self._lower: list[Points | None] = [None] * len(skins)  # what the rig below moves the skins by
         self._masks: list[Mask | None] = [None] * len(skins)
         self._below: tuple[Session, int] | None = None
         self._carry_coords: Matrices | None = None
-        self._last: tuple[Any, ...] | None = None
         self._posed_cage: tuple[int, Points] | None = None
 
     @property
@@ -143,14 +140,11 @@ class Session:
     @_door
     def play(self, cage: Points, transforms: Matrices, rest_joints: Matrices, influence: float = 1.0) -> None:
         """Set the rest cage (`#C by 3`, rig space) and the animation's transforms (`#J by 4 by 4`) together."""
-        key = (cage.tobytes(), transforms.tobytes(), rest_joints.tobytes(), influence)
-        if key == self._last:
-            return
-        base = self.snapshot.cage.astype(np.float64)
-        shape = cage if influence == 1.0 else base + influence * (cage.astype(np.float64) - base)
-        self.rig.play(shape, transforms, rest_joints)
-        self._last, self.influence = key, influence
-        self.revision += 1
+        if influence != 1.0:
+            base = self.snapshot.cage.astype(np.float64)
+            cage = base + influence * (cage.astype(np.float64) - base)
+        self.influence = influence
+        self.revision += self.rig.play(cage, transforms, rest_joints)
 
     @_door
     def set_method(self, name: str) -> None:
@@ -181,7 +175,6 @@ class Session:
         if self.influence < 1e-3:
             raise SessionError("the rig's influence is 0, so an edit of the posed cage can't show; raise it first")
         self.rig.edit_posed_cage(posed_cage)
-        self._last = None
         self.revision += 1
         base = self.snapshot.cage.astype(np.float64)
         return base + (self.rig.rest_cage - base) / self.influence
@@ -281,7 +274,9 @@ class Session:
     def posed_cage(self) -> Points:
         """The posed cage, `#C by 3` in rig space, as the float32 that Blender keeps."""
         if self._posed_cage is None or self._posed_cage[0] != self.revision:
-            self._posed_cage = (self.revision, self.rig.posed_cage.astype(np.float32))
+            points = np.empty_like(self.snapshot.cage)
+            self.rig.posed_cage_into(points)
+            self._posed_cage = (self.revision, points)
         return self._posed_cage[1]
 
     def cage_influence(self, vertices: Sequence[int]) -> NDArray[np.float32]:
@@ -316,21 +311,21 @@ class Session:
         return np.asarray(self.rig.posed_joints), np.asarray(self.rig.posed_joints + along)
 
     @_door
-    def refit_pose(self, rest: Matrices) -> Matrices:
-        """Posed matrices of the refit bones, `#J by 4 by 4`: orientation of the animation, head at the refit joint.
+    def refit_bones(self, rest: Matrices) -> cage_rig_core.Bones:
+        """The bones of a refit armature from their rest matrices, `#J by 4 by 4`.
 
-        `rest` are the bones' rest matrices. A bone whose tail was its child's head at bind is stretched along
-        itself to reach the child's refit joint.
+        One whose tail was its child's head at bind is stretched along itself to reach the child's refit joint.
         """
-        joints = self.rig.joints
-        moved = rest.copy()
-        moved[:, :3, 3] = joints
-        if len(self._links):
-            bone, child = self._links.T
-            along = rest[bone, :3, 1]
-            reach = ((joints[child] - joints[bone]) * along).sum(axis=1) / self._lengths[bone]
-            moved[bone, :3, 1] *= np.maximum(reach, 0.05)[:, None]
-        return self.rig.transforms @ moved
+        links, snapshot = _tail_links(self.snapshot), self.snapshot
+        lengths = np.linalg.norm(snapshot.tails - snapshot.heads, axis=1)[links[:, 0]]
+        return cage_rig_core.Bones(rest, links, np.maximum(lengths, 1e-12))
+
+    @_door
+    def refit_pose(self, bones: cage_rig_core.Bones) -> Matrices:
+        """What poses the `refit_bones`, each in its own rest space, `#J by 4 by 4`: orientation of the animation, head
+        at the refit joint.
+        """
+        return self.rig.refit_pose(bones)
 
 
 class BindJob:
@@ -362,6 +357,18 @@ class BindJob:
     def result(self) -> Session:
         """The session; waits for it. Raises `SessionError` where the core refuses, or when it was cancelled."""
         return Session(self._snapshot, self._job)
+
+
+@_door
+def bones(rest: Matrices) -> cage_rig_core.Bones:
+    """The animation's bones from their rest matrices, `#J by 4 by 4`."""
+    return cage_rig_core.Bones(rest)
+
+
+@_door
+def transforms(rest: cage_rig_core.Bones, posed: Matrices) -> Matrices:
+    """Transforms T where these bones are `posed`, both `#J by 4 by 4`; the identity where one rests."""
+    return rest.transforms(posed)
 
 
 @_door

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from . import binding, choosing, glance, health, layers, linked, migration, registry, skins
 from .adapters import armature, cage_keys, modifier, positions, shape_keys, stack
 from .session import Below, Session, SessionCrash, SessionError
+from .session import transforms as transforms_of
 
 Points = NDArray[np.float32]
 Matrix = NDArray[np.float64]
@@ -41,7 +43,8 @@ class _Running:
     posed: Points | None = None  # posed cage as last read or written
     stale: bool = False  # the posed cage's mesh is not that of this pose: it was hidden
     memory: bytes = b""  # what the edit mesh of the posed cage remembers
-    refit_rest: tuple[Matrix, Matrix] | None = None  # of the refit bones, and its inverse
+    refit_bones: Any = None  # the core's, once they were read
+    cage_to_rig: Matrix | None = None  # once it was read
     bones: glance.Bones | None = None  # as last read
     seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
     places: skins.Places = field(default_factory=dict)
@@ -91,7 +94,7 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     if _rendering and depsgraph.mode == "VIEWPORT":
         return
     _again.clear()
-    if any(isinstance(change.id, bpy.types.Armature) for change in depsgraph.updates):
+    if depsgraph.id_type_updated("ARMATURE"):
         for running in _running.values():
             running.seen = None  # bones may be other ones
     for cage in registry.rigs():
@@ -234,7 +237,7 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
     later = event is Event.RESTORED or choosing.is_by_hand(cage) or choosing.progress(cage) is not None
     later &= depsgraph.mode == "VIEWPORT" and not _rendering
     choosing.use(cage, session, shown.method.lower(), later=later)
-    rest = _read_rest_cage(cage, depsgraph)
+    rest = _read_rest_cage(cage, running, depsgraph)
     if len(rest) != len(session.snapshot.cage):
         raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")
     rest_changed = not _is_known(running, rest)
@@ -361,12 +364,14 @@ def _move_rest_cage(cage: bpy.types.Object, before: Points, wanted: Matrix) -> N
         shape_keys.move(cage, delta.astype(np.float32))
 
 
-def _read_rest_cage(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points:
+def _read_rest_cage(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> Points:
+    if running.cage_to_rig is None:
+        running.cage_to_rig = _matrix(cage.cage_rig.cage_to_rig)
     if cage.data.is_editmode:
         points = positions.read_edit_mesh(cage.data)
     else:
         points = positions.read_evaluated(cage, depsgraph)
-    return positions.apply_matrix(_matrix(cage.cage_rig.cage_to_rig), points)
+    return positions.apply_matrix(running.cage_to_rig, points)
 
 
 def _read_posed_cage(posed: bpy.types.Object) -> Points:
@@ -382,11 +387,7 @@ def _read_pose(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.D
     posed = armature.read_pose_matrices(obj)
     if bones.pose_order is not None:
         posed = posed[bones.pose_order]
-    transforms = posed @ bones.inverse
-    still = np.abs(posed - bones.rest).reshape(len(posed), 16).max(axis=1) <= 1e-7
-    if still.any():
-        transforms[still] = np.eye(4)
-    return transforms, bones.heads
+    return transforms_of(bones.core, posed), bones.heads
 
 
 def _ask_again(cage: bpy.types.Object) -> None:
@@ -437,14 +438,15 @@ def _is_back(key: registry.Key) -> bool:
 
 def _write_posed_cage(running: _Running, posed: bpy.types.Object) -> None:
     """Write C′ where it differs from what the mesh holds. What the artist holds in Edit Mode is left alone."""
-    points = running.session.posed_cage()
+    points, editing = running.session.posed_cage(), posed.data.is_editmode
     if running.posed is not None:
-        tolerance = 1e-6 * running.session.size if posed.data.is_editmode else 0.0
-        if positions.close(points, running.posed, tolerance):
+        tolerance = 1e-6 * running.session.size
+        same = positions.close(points, running.posed, tolerance) if editing else np.array_equal(points, running.posed)
+        if same:
             return
-    write = positions.write_edit_mesh if posed.data.is_editmode else positions.write_base
+    write = positions.write_edit_mesh if editing else positions.write_base
     write(posed.data, points)
-    running.posed = points.copy()
+    running.posed = points
 
 
 def _remember(running: _Running, posed: bpy.types.Object) -> None:
@@ -461,13 +463,11 @@ def _remember(running: _Running, posed: bpy.types.Object) -> None:
 def _write_refit(running: _Running, refit: bpy.types.Object | None) -> None:
     if refit is None or refit.mode == "EDIT" or len(refit.data.bones) != len(running.session.snapshot.heads):
         return
-    if running.refit_rest is None:
-        rest = armature.read_rest_matrices(refit.data)
-        running.refit_rest = rest, np.linalg.inv(rest)
+    if running.refit_bones is None:
+        running.refit_bones = running.session.refit_bones(armature.read_rest_matrices(refit.data))
     state = (running.session.revision, b"")
     if running.written.get(-1) != state:
-        rest, inverse = running.refit_rest
-        armature.write_refit_pose(refit, inverse, running.session.refit_pose(rest))
+        armature.write_refit_pose(refit, running.session.refit_pose(running.refit_bones))
         running.written[-1] = state
 
 

@@ -24,7 +24,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "linked": ({"bpy"}, {"adapters"}),
     "registry": ({"bpy"}, {"adapters", "layers"}),
     "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked"}),
-    "glance": ({"bpy", "numpy"}, {"adapters", "health"}),
+    "glance": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "migration": ({"bpy"}, {"adapters", "binding", "layers"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),

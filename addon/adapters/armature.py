@@ -262,9 +262,8 @@ def depend_on_bones(obj: bpy.types.Object, armature_object: bpy.types.Object, na
         target.id, target.bone_target = armature_object, name
 
 
-def write_refit_pose(obj: bpy.types.Object, rest_inverse: Matrices, posed: Matrices) -> None:
-    """Pose the parentless refit bones at `posed`, `#J by 4 by 4` in the armature's space."""
-    basis = rest_inverse @ posed
+def write_refit_pose(obj: bpy.types.Object, basis: Matrices) -> None:
+    """Pose the parentless refit bones, each by `basis` in its own rest space, `#J by 4 by 4`."""
     obj.pose.bones.foreach_set("matrix_basis", basis.transpose(0, 2, 1).astype(np.float32).ravel())
     obj.update_tag(refresh={"DATA"})
 

@@ -109,6 +109,18 @@ class Work(TypedDict):
     center_column_passes: int
 
 @final
+class Bones:
+    def __new__(
+        cls,
+        rest: ArrayLike,  # (#J, 4, 4), acting on columns
+        tail_links: ArrayLike | None = None,  # (#links, 2): bones whose tails follow a child's joint when refit
+        lengths: ArrayLike | None = None,  # (#links,) of those bones, when their tails were there
+    ) -> Bones: ...
+    @property
+    def heads(self) -> Doubles: ...
+    def transforms(self, posed: ArrayLike) -> Doubles: ...  # (#J, 4, 4); the identity where a bone rests
+
+@final
 class CoupledRig:
     def __new__(
         cls,
@@ -140,7 +152,7 @@ class CoupledRig:
         cage: ArrayLike,  # (#C, 3)
         transforms: ArrayLike,
         rest_joints: ArrayLike | None = None,
-    ) -> None: ...
+    ) -> bool: ...  # whether anything of it was new
     def offset_rest_skin(self, offsets: ArrayLike | None) -> None: ...
     def mask_skin(self, mask: ArrayLike | None) -> None: ...  # (#M,), 0 to 1: where the cage acts
     def carry(
@@ -175,6 +187,7 @@ class CoupledRig:
     def posed_joints(self) -> Doubles: ...
     @property
     def transforms(self) -> Doubles: ...
+    def refit_pose(self, bones: Bones) -> Doubles: ...  # (#J, 4, 4): poses each in its own rest space
     def cage_influence(self, vertices: ArrayLike) -> NDArray[np.float32]: ...  # (#M,)
     @property
     def cage_coords(self) -> Doubles: ...

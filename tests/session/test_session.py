@@ -140,7 +140,7 @@ def test_refit_bones_reach_their_children(live: object, snapshot: object) -> Non
     live.play(stretched, bend(snapshot, 0.0), snapshot.heads)
     rest = np.stack([np.array([[0, -1, 0, x], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], float) for x in (-1, 0)])
     rest[:, :3, :3] = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]], float)  # bones along x
-    posed = live.refit_pose(rest)
+    posed = rest @ live.refit_pose(live.refit_bones(rest))
     assert np.allclose(posed[:, :3, 3], [[-1.5, 0, 0], [0, 0, 0]], atol=1e-6)
     assert np.allclose(posed[0] @ [0, 1.0, 0, 1], [0, 0, 0, 1], atol=1e-6)
 

@@ -13,6 +13,7 @@
 
 #![allow(rustdoc::broken_intra_doc_links)] // [CTL*20] and its like are citations
 
+pub mod bones;
 mod cage;
 pub mod caging;
 pub mod coordinates;

@@ -25,6 +25,17 @@ impl Transform {
         self.linear * point + self.translation
     }
 
+    /// This map after `other`.
+    pub fn after(&self, other: &Self) -> Self {
+        Self { linear: self.linear * other.linear, translation: self.apply(&other.translation) }
+    }
+
+    /// The map that takes back what this one does; where its linear part has no inverse, its step alone.
+    pub fn inverse(&self) -> Self {
+        let linear = self.linear.try_inverse().unwrap_or_else(Matrix3::identity);
+        Self { linear, translation: -(linear * self.translation) }
+    }
+
     /// True when every entry is finite and at most [`LARGEST`].
     pub fn is_usable(&self) -> bool {
         self.linear.iter().chain(self.translation.iter()).all(is_usable)

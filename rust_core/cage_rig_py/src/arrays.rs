@@ -6,7 +6,7 @@ use crate::errors::ArrayError;
 use cage_rig::{Matrix3, Point, Polygons, Rows, SkinWeights, Transform};
 use numpy::ndarray::ArrayViewMutD;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArray,
+    Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
@@ -148,8 +148,17 @@ fn rows_of(block: Block<f64>, argument: &str) -> PyResult<Rows> {
 
 /// Transforms, `#J by 4 by 4`, acting on columns.
 pub(crate) fn transforms(value: &Bound<'_, PyAny>, joints: usize) -> PyResult<Vec<Transform>> {
-    let shape = [("#J", Some(joints)), ("4", Some(4)), ("4", Some(4))];
-    affine(&finite_floats(value, "transforms", &shape)?, joints)
+    matrices(value, "transforms", Some(joints))
+}
+
+/// Affine matrices of bones, `#J by 4 by 4`, acting on columns.
+pub(crate) fn matrices(
+    value: &Bound<'_, PyAny>,
+    argument: &str,
+    joints: Option<usize>,
+) -> PyResult<Vec<Transform>> {
+    let block = finite_floats(value, argument, &[("#J", joints), ("4", Some(4)), ("4", Some(4))])?;
+    affine(&block, block.shape[0])
 }
 
 /// Transforms of frames, `#F by #J by 4 by 4`, frame by frame.
@@ -229,6 +238,21 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>, vertices: usize, joints: usize) 
 pub(crate) fn from_points<'py>(py: Python<'py>, points: &[Point]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let flat: Vec<f64> = points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     PyArray1::from_vec(py, flat).reshape([points.len(), 3])
+}
+
+/// A fresh `n by 4 by 4` array, acting on columns.
+pub(crate) fn from_transforms<'py>(
+    py: Python<'py>,
+    transforms: &[Transform],
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let mut flat = Vec::with_capacity(16 * transforms.len());
+    for Transform { linear, translation } in transforms {
+        for row in 0..3 {
+            flat.extend([linear[(row, 0)], linear[(row, 1)], linear[(row, 2)], translation[row]]);
+        }
+        flat.extend([0.0, 0.0, 0.0, 1.0]);
+    }
+    PyArray1::from_vec(py, flat).reshape([transforms.len(), 4, 4])
 }
 
 /// A fresh `n by 3` array from frame numbers.

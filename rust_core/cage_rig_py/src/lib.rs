@@ -2,6 +2,7 @@
 //! arrays at the door, releases the GIL around work, and turns errors into exceptions.
 
 mod arrays;
+mod bones;
 mod caging;
 mod errors;
 mod functions;
@@ -17,6 +18,7 @@ fn cage_rig_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("PanicException", module.py().get_type::<pyo3::panic::PanicException>())?;
     module.add_class::<rig::CoupledRig>()?;
+    module.add_class::<bones::Bones>()?;
     module.add_class::<jobs::BindJob>()?;
     module.add_class::<jobs::MethodJob>()?;
     functions::add_to(module)?;

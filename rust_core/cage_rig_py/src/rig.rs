@@ -2,6 +2,7 @@
 //! call is refused instead of working on what the panic left behind.
 
 use crate::arrays::{self, Out};
+use crate::bones::Bones;
 use crate::errors::{CageRigError, OrRaise};
 use crate::input::{read_input, Given, Meshes};
 use crate::jobs::MethodJob;
@@ -113,7 +114,7 @@ impl CoupledRig {
         self.with(py, |rig| rig.edit_posed_cage(&cage))?.or_raise()
     }
 
-    /// Playback: rest cage and transforms together.
+    /// Playback: rest cage and transforms together. Whether anything of it was new.
     #[pyo3(signature = (cage, transforms, rest_joints=None))]
     fn play(
         &self,
@@ -121,7 +122,7 @@ impl CoupledRig {
         cage: &Bound<'_, PyAny>,
         transforms: &Bound<'_, PyAny>,
         rest_joints: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
+    ) -> PyResult<bool> {
         let cage = self.cage(cage)?;
         let transforms = arrays::transforms(transforms, self.joints)?;
         let rest_joints = self.rest_joints(rest_joints)?;
@@ -268,17 +269,13 @@ impl CoupledRig {
     /// Transforms of the refit skeleton (#J, 4, 4), a copy.
     #[getter]
     fn transforms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let transforms = self.with(py, |rig| rig.transforms().to_vec())?;
-        let number = |k: usize| {
-            let (transform, row, column) = (&transforms[k / 16], k / 4 % 4, k % 4);
-            match (row, column) {
-                (3, _) => f64::from(u8::from(column == 3)),
-                (_, 3) => transform.translation[row],
-                _ => transform.linear[(row, column)],
-            }
-        };
-        let flat: Vec<f64> = (0..16 * transforms.len()).map(number).collect();
-        PyArray1::from_vec(py, flat).reshape([transforms.len(), 4, 4])
+        arrays::from_transforms(py, &self.with(py, |rig| rig.transforms().to_vec())?)
+    }
+
+    /// What poses these bones (#J, 4, 4) as the refit skeleton, each in its own rest space.
+    fn refit_pose<'py>(&self, py: Python<'py>, bones: &Bones) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        bones.check(self.joints)?;
+        arrays::from_transforms(py, &self.with(py, |rig| bones.bones.refit(rig.transforms(), rig.joints()))?)
     }
 
     /// Cage coordinates (#M, #C), a copy.

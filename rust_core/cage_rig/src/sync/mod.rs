@@ -162,16 +162,16 @@ impl CoupledRig {
     }
 
     /// Playback: rest cage and bones together, as [`Self::edit_rest_cage`] and [`Self::pose`].
+    /// Returns whether anything of it was new.
     pub fn play(
         &mut self,
         cage: &[Point],
         transforms: &[Transform],
         rest_joints: Option<&[Point]>,
-    ) -> Result<(), PoseError> {
+    ) -> Result<bool, PoseError> {
         self.check_cage(cage)?;
         self.read_motions(transforms, rest_joints)?;
-        self.propagate(Some(cage), true);
-        Ok(())
+        Ok(self.propagate(Some(cage), true))
     }
 
     /// Moves the visible skin at rest by `offsets` (`#M by 3`; shape keys of a face). Anchors and
@@ -258,12 +258,12 @@ impl CoupledRig {
     }
 
     /// The only place that knows what follows from what. `motions`: those just read count. What is
-    /// given and equal to what is there changes nothing.
-    fn propagate(&mut self, cage: Option<&[Point]>, motions: bool) {
+    /// given and equal to what is there changes nothing; returns whether anything changed.
+    fn propagate(&mut self, cage: Option<&[Point]>, motions: bool) -> bool {
         let cage = cage.filter(|cage| *cage != self.rest_cage.as_slice());
         let motions = motions && self.buffers.motions != self.motions;
         if cage.is_none() && !motions {
-            return;
+            return false;
         }
         if let Some(cage) = cage {
             self.rest_cage.copy_from_slice(cage);
@@ -278,6 +278,7 @@ impl CoupledRig {
             }
         }
         self.refit();
+        true
     }
 
     fn rest_skin_changed(&mut self) {
