@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import cage_rig_core
 import numpy as np
@@ -51,13 +52,30 @@ class Input:
         arrays = (self.points, *self.faces, self.nodes, self.edges)
         return (*(array.tobytes() for array in arrays), tuple(sorted(self.options.items())))
 
+    @property
+    def fingerprint(self) -> str:
+        """Of the skin and the skeleton, for files: equal for equal ones."""
+        found = hashlib.blake2b(digest_size=16)
+        for array in (self.points, *self.faces, self.nodes, self.edges):
+            found.update(np.ascontiguousarray(array).tobytes())
+        return found.hexdigest()
+
+
+class Earlier(NamedTuple):
+    """A cage of the same input, in rig space: its bending nodes (None where they were placed), vertices, and faces."""
+
+    bending: Points | None
+    points: Points
+    faces: Faces
+
 
 @dataclass(frozen=True)
 class Section:
     """A control node and its cross section, in rig space."""
 
     bending: bool  # else at the end of a limb
-    point: Points
+    place: Points  # on the skeleton
+    point: Points  # beside it, in the middle of the skin
     radius: float
     node: int  # the nearest one of the skeleton
     arc: int
@@ -160,9 +178,9 @@ class Generator:
         return [_section(found) for found in self._core.sections(bending)]
 
     @_door
-    def start(self, bending: Points | None = None) -> Job:
-        """Begin to make the cage."""
-        return Job(self._core.generate(bending))
+    def start(self, bending: Points | None = None, earlier: Earlier | None = None) -> Job:
+        """Begin to make the cage. What an earlier one has around nodes that are still there stays."""
+        return Job(self._core.generate(bending, earlier))
 
     @property
     def arcs(self) -> list[Arc]:
@@ -185,6 +203,7 @@ def extract_skeleton(points: Points, faces: Faces) -> tuple[Points, NDArray[np.i
 def _section(found: dict[str, Any]) -> Section:
     return Section(
         found["kind"] == "bending",
+        np.asarray(found["place"]),
         np.asarray(found["point"]),
         float(found["radius"]),
         int(found["node"]),

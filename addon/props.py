@@ -247,6 +247,7 @@ class CageRigGenerated(bpy.types.PropertyGroup):
 
     armature: PointerProperty(type=bpy.types.Object, name="Armature")
     skins: CollectionProperty(type=CageRigCaged, name="Skins")
+    fingerprint: StringProperty(description="Of skin and skeleton as they were")
     own_nodes: BoolProperty(name="Own Nodes", description="Whether the artist has chosen the bending nodes")
     nodes: CollectionProperty(type=CageRigBendingNode, name="Bending Nodes")
     placement: StringProperty(default="AUTOMATIC")

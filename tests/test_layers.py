@@ -33,7 +33,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
         {"adapters", "binding", "choosing", "glance", "health", "layers", "linked", "migration"}
         | {"registry", "session", "skins"},
     ),
-    "generator": ({"cage_rig_core", "numpy"}, set()),
+    "generator": ({"cage_rig_core", "hashlib", "numpy"}, set()),
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "installation": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "session", "sync"}),
     "lifecycle": (

@@ -44,6 +44,7 @@ __all__ = [
     "options_of",
     "refuse_cage",
     "source",
+    "start",
 ]
 
 
@@ -89,13 +90,18 @@ def make(
     found = open_character(context, armature, skins, options)
     editing = edit(found, options, nodes)
     try:
-        job = found.generator.start(editing.bending)
+        job = start(found, options, editing, cage)
         while not job.wait(0.1):
             if watch is not None:
                 watch(job)
         return finish(context, job, found, options, editing.nodes, cage=cage, tell=tell)
     except Refusal as refusal:
         raise explain(refusal, found) from refusal
+
+
+def start(found: Character, options: Options, editing: Editing, cage: bpy.types.Object | None) -> Job:
+    """Begin to make the cage of these nodes. Sections of `cage` that they leave alone stay as they are."""
+    return found.generator.start(editing.bending, result.earlier(cage, found, options) if cage else None)
 
 
 def open_character(

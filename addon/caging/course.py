@@ -136,6 +136,11 @@ class Course:
         bone, position = self.named(place)
         return self.find(OnBone(bone, float(np.float32(position)))) or place
 
+    def places(self, nodes: list[OnBone]) -> list[Place]:
+        """The places that a file keeps; bones that are gone have none."""
+        found = (self.find(node) for node in nodes)
+        return [self.kept(place) for place in found if place is not None]
+
     def left_out(self, dropped: list[int]) -> list[str]:
         """Bones that no part of the skeleton follows, or no part of a cage that left these nodes out."""
         followed = {self.graph.bones[piece.edge] for piece in self._pieces}

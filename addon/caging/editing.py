@@ -47,8 +47,7 @@ class Editing:
         if nodes is None:
             self._place(source)
         else:
-            found = [source.course.find(node) for node in nodes]
-            self._look(_State(source, tuple(place for place in found if place is not None), own=True))
+            self._look(_State(source, tuple(source.course.places(nodes)), own=True))
 
     @property
     def course(self) -> Course:
@@ -77,7 +76,7 @@ class Editing:
 
     def _place(self, source: Source) -> None:
         self.sections = source.generator.sections(None)
-        places = (source.course.nearest(section.point, section.arc) for section in self.sections if section.bending)
+        places = (source.course.nearest(section.place, section.arc) for section in self.sections if section.bending)
         self._state = _State(source, tuple(places), own=False)
         self.revision += 1
 

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ..adapters import positions, vertex_groups
-from ..generator import Cage, Points
+from ..generator import Cage, Earlier, Points
 from .character import Character
 from .course import OnBone
 from .options import Options
@@ -58,6 +59,7 @@ def write(
     if character.armature is not None:
         vertex_groups.write_whole(cage, [bones[owner] for owner in made.owners.tolist()])
     _remember(cage, character, options, nodes)
+    cage.cage_rig_generated.fingerprint = character.generator.given.fingerprint
     _select(context, cage, character)
     return cage
 
@@ -118,6 +120,28 @@ def nodes_of(cage: bpy.types.Object) -> list[OnBone] | None:
     return [OnBone(node.name, node.position) for node in kept.nodes] if kept.own_nodes else None
 
 
+def earlier(cage: bpy.types.Object, character: Character, options: Options) -> Earlier | None:
+    """What this cage can lend to one with other nodes: nothing where more than nodes has changed since it was made."""
+    before, nodes = options_of(cage), nodes_of(cage)
+    if nodes is not None:
+        before = replace(before, placement=options.placement)  # nothing was placed
+    known = cage.cage_rig_generated.fingerprint == character.generator.given.fingerprint
+    if not known or before.core() != options.core() or SECTION not in cage.data.attributes:
+        return None
+    owners = np.empty(len(cage.data.vertices), np.int32)
+    layer = cage.data.attributes[SECTION]
+    if len(layer.data) != len(owners):
+        return None
+    layer.data.foreach_get("value", owners)
+    if not np.array_equal(owners, np.repeat(np.arange(len(owners) // options.corners), options.corners)):
+        return None  # the artist has added or deleted vertices
+    to_rig = np.linalg.inv(np.array(character.space.matrix_world)) @ np.array(cage.matrix_world)
+    points = positions.apply_matrix(to_rig, positions.read_base(cage.data).astype(float))
+    course = character.course
+    bending = None if nodes is None else course.points(course.places(nodes))
+    return Earlier(bending, points, positions.read_faces(cage.data))
+
+
 def summary(cage: bpy.types.Object, made: Cage, notes: list[str]) -> str:
     """One sentence on the cage, and what the artist should know."""
     sizes = Counter(made.faces[1].tolist())
@@ -126,4 +150,6 @@ def summary(cage: bpy.types.Object, made: Cage, notes: list[str]) -> str:
         f"'{cage.name}': {len(made.points)} vertices in {len(made.sections)} cross sections, {quads} quads and "
         f"{triangles} triangles, {made.report['volume_ratio']:.2f} times the volume of what it encloses"
     )
+    if made.report["kept_vertices"]:
+        text += f"; {made.report['kept_vertices']} vertices are where they were"
     return ". ".join([text, *notes])

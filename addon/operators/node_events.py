@@ -212,7 +212,7 @@ class Run:
         # symmetry and placement may have been switched on the way
         self.options = replace(self.options, placement=self.editing.placement)
         self.character = caging.open_character(context, self.character.armature, self.character.skins, self.options)
-        self.job = self.character.generator.start(self.editing.bending)
+        self.job = caging.start(self.character, self.options, self.editing, self.cage)
         self._shown.working = "Generating"
         self._wait = waiting.Wait(context, "Generating the cage", self.job.cancel)
 

@@ -281,7 +281,8 @@ class CagingOptions(TypedDict, total=False):
 
 class Section(TypedDict):
     kind: Literal["bending", "leaf"]
-    point: Doubles  # (3,)
+    place: Doubles  # (3,), on the skeleton
+    point: Doubles  # (3,), beside it, in the middle of the skin
     direction: Doubles  # (3,)
     radius: float
     node: int  # the nearest node of the skeleton
@@ -303,6 +304,7 @@ class Repairs(TypedDict):
 class CagingReport(TypedDict):
     sections: list[Section]
     vertex_sections: NDArray[np.int64]  # (#C,)
+    kept_vertices: int  # that are where an earlier cage had them
     dropped_nodes: list[int]
     repairs: Repairs
     volume_ratio: float
@@ -374,7 +376,11 @@ class CageGenerator:
         options: CagingOptions | None = None,
     ) -> CageGenerator: ...
     def sections(self, bending_nodes: ArrayLike | None = None) -> list[Section]: ...
-    def generate(self, bending_nodes: ArrayLike | None = None) -> CagingJob: ...
+    def generate(
+        self,
+        bending_nodes: ArrayLike | None = None,
+        earlier: tuple[ArrayLike | None, ArrayLike, Faces] | None = None,  # bending nodes, vertices (#C, 3), faces
+    ) -> CagingJob: ...
     @property
     def arcs(self) -> list[Arc]: ...  # the skeleton as it is used: clipped, recentred, pruned
     @property

@@ -4,7 +4,7 @@ use crate::arrays;
 use crate::errors::{cancelled, CageRigError, OrRaise};
 use crate::jobs::Job;
 use cage_rig::caging::{
-    CageReport, CagingOptions, GeneratedCage, Generator, NodeKind, Placement, Repairs, SectionReport,
+    CageReport, CagingOptions, Earlier, GeneratedCage, Generator, NodeKind, Placement, Repairs, SectionReport,
 };
 use cage_rig::{CagingError, Error, Point, Polygons, Progress};
 use numpy::{PyArray1, PyArrayMethods};
@@ -80,7 +80,7 @@ impl CagingJob {
     ) -> PyResult<Self> {
         let input = Input::read([vertices, faces], [nodes, edges], options)?;
         let bending = bending_points(bending_nodes)?;
-        Self::start(move |progress| input.generator()?.generate(bending.as_deref(), &progress.whole()))
+        Self::start(move |progress| input.generator()?.generate(bending.as_deref(), None, &progress.whole()))
     }
 
     /// How much is done, 0 to 1. Never falls.
@@ -121,6 +121,9 @@ impl CagingJob {
         self.0.describe("CagingJob")
     }
 }
+
+/// Bending nodes, vertices and faces.
+type EarlierCage<'py> = (Option<Bound<'py, PyAny>>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 /// A skin and its skeleton, kept: another call traces only the sections that its bending nodes changed.
 #[pyclass(frozen, module = "cage_rig_core")]
@@ -175,12 +178,26 @@ impl CageGenerator {
         repairs_dict(py, &self.0.repairs())
     }
 
-    /// Begins the cage in a thread of its own.
-    #[pyo3(signature = (bending_nodes=None))]
-    fn generate(&self, bending_nodes: Option<&Bound<'_, PyAny>>) -> PyResult<CagingJob> {
+    /// Begins the cage in a thread of its own. `earlier`: bending nodes (or None), vertices (#C, 3) and
+    /// faces of a cage of the same skin, skeleton and options; what it has around nodes that are still
+    /// there stays.
+    #[pyo3(signature = (bending_nodes=None, earlier=None))]
+    fn generate(
+        &self,
+        bending_nodes: Option<&Bound<'_, PyAny>>,
+        earlier: Option<EarlierCage<'_>>,
+    ) -> PyResult<CagingJob> {
         let bending = bending_points(bending_nodes)?;
+        let read = |(bending, vertices, faces): EarlierCage<'_>| -> PyResult<Earlier> {
+            let vertices = arrays::points(&vertices, "earlier vertices", ("#C", None))?;
+            let faces = arrays::polygons(&faces, "earlier faces")?;
+            Ok(Earlier { bending: bending_points(bending.as_ref())?, vertices, faces })
+        };
+        let earlier = earlier.map(read).transpose()?;
         let generator = Arc::clone(&self.0);
-        CagingJob::start(move |progress| generator.generate(bending.as_deref(), &progress.whole()))
+        CagingJob::start(move |progress| {
+            generator.generate(bending.as_deref(), earlier.as_ref(), &progress.whole())
+        })
     }
 }
 
@@ -261,6 +278,7 @@ fn section_list<'py>(py: Python<'py>, sections: &[SectionReport]) -> PyResult<Bo
     for section in sections {
         let entry = PyDict::new(py);
         entry.set_item("kind", if section.kind == NodeKind::Leaf { "leaf" } else { "bending" })?;
+        entry.set_item("place", point(py, &section.place))?;
         entry.set_item("point", point(py, &section.point))?;
         entry.set_item("direction", point(py, &section.direction))?;
         entry.set_item("radius", section.radius)?;
@@ -282,6 +300,7 @@ fn report_dict<'py>(py: Python<'py>, report: &CageReport) -> PyResult<Bound<'py,
     found.set_item("sections", section_list(py, &report.sections)?)?;
     let owners: Vec<i64> = report.vertex_sections.iter().map(|s| *s as i64).collect();
     found.set_item("vertex_sections", PyArray1::from_vec(py, owners))?;
+    found.set_item("kept_vertices", report.kept)?;
     found.set_item("dropped_nodes", report.dropped.clone())?;
     found.set_item("repairs", repairs_dict(py, &report.repairs)?)?;
     found.set_item("volume_ratio", report.volume_ratio)?;

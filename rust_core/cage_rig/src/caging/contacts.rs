@@ -28,6 +28,8 @@ pub(crate) struct Body {
     pub(crate) tree: Bvh,
     /// Which corners and which sides (k to k + 1) a triangle owns.
     owns: Vec<([bool; 3], [bool; 3])>,
+    /// Triangles that never move: gaps between two of them are of no interest.
+    still: Vec<bool>,
 }
 
 impl Body {
@@ -40,7 +42,12 @@ impl Body {
                 (own, [0, 1, 2].map(|k| sides.insert((t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])))))
             })
             .collect();
-        Self { tree: Bvh::new(points, triangles), owns }
+        Self { tree: Bvh::new(points, triangles), owns, still: vec![false; triangles.len()] }
+    }
+
+    /// Triangles with no corner that moves are still from now on.
+    pub(crate) fn hold(&mut self, moves: impl Fn(u32) -> bool) {
+        self.still = self.tree.triangles().iter().map(|t| !t.iter().any(|v| moves(*v))).collect();
     }
 }
 
@@ -72,13 +79,15 @@ impl Points<'_> {
     }
 }
 
-/// All gaps narrower than `reach` that the cage has a part in, the narrowest first. Trees must be
+/// All gaps narrower than `reach` that a moving part of the cage has a part in, the narrowest first. Trees must be
 /// fitted to `points`.
 pub(crate) fn contacts(cage: &Body, obstacle: &Body, points: &Points, reach: f64) -> Vec<Contact> {
     let faces = cage.tree.triangles();
     let near = |at: usize| {
         let mut found = Vec::new();
-        with_obstacle(at, cage, obstacle, points, reach, &mut found);
+        if !cage.still[at] {
+            with_obstacle(at, cage, obstacle, points, reach, &mut found);
+        }
         with_itself(at, cage, points, reach, &mut found);
         found
     };
@@ -147,6 +156,9 @@ fn with_itself(at: usize, cage: &Body, points: &Points, reach: f64, found: &mut 
     let a = cage.tree.triangles()[at];
     let own_sides = cage.owns[at].1;
     cage.tree.near_triangle(a.map(|v| &points.cage[v as usize]), reach, |t| {
+        if cage.still[at] && cage.still[t as usize] {
+            return;
+        }
         let b = cage.tree.triangles()[t as usize];
         let (corners, sides) = cage.owns[t as usize];
         let mut add = |gap, at| push(found, gap, at, points, reach);

@@ -36,6 +36,9 @@ pub enum NodeKind {
 pub(crate) struct ControlNode {
     pub(crate) kind: NodeKind,
     pub(crate) arc: usize,
+    /// On the arc.
+    pub(crate) place: Point,
+    /// Beside it, in the middle of the skin.
     pub(crate) point: Point,
     /// Along the arc, from its first end to its second.
     pub(crate) direction: Point,
@@ -100,9 +103,11 @@ fn nearest_node(arc: &Arc, s: f64) -> usize {
 fn bending_node(skin: &Skin, arc: &Arc, at: usize, s: f64) -> ControlNode {
     let radius = arc.radius_at(s);
     let direction = arc.direction(s, radius.min(0.25 * arc.length()));
-    let point = climb(skin, arc.at(s), Some(direction));
+    let place = arc.at(s);
+    let point = climb(skin, place, Some(direction));
     let radius = skin.depth(&point).max(1e-3);
-    ControlNode { kind: NodeKind::Bending, arc: at, point, direction, radius, node: nearest_node(arc, s) }
+    let node = nearest_node(arc, s);
+    ControlNode { kind: NodeKind::Bending, arc: at, place, point, direction, radius, node }
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
@@ -123,16 +128,11 @@ fn leaf_node(skin: &Skin, arc: &Arc, at: usize, side: usize, neighbour: Option<f
         .find(|d| arc.radius_at(from_tip(*d)) >= wanted);
     let s = from_tip(found.unwrap_or(room));
     let direction = arc.direction(s, 0.1 * length);
-    let point = climb(skin, arc.at(s), Some(direction));
+    let place = arc.at(s);
+    let point = climb(skin, place, Some(direction));
     let radius = skin.depth(&point).max(1e-3);
-    ControlNode {
-        kind: NodeKind::Leaf,
-        arc: at,
-        point,
-        direction,
-        radius,
-        node: nearest_node(arc, from_tip(0.0)),
-    }
+    let node = nearest_node(arc, from_tip(0.0));
+    ControlNode { kind: NodeKind::Leaf, arc: at, place, point, direction, radius, node }
 }
 
 /// Places on an arc that crosses the plane of symmetry and is its own image: those of its first half,

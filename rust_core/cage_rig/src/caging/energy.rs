@@ -41,6 +41,18 @@ pub(crate) struct Shape<'a> {
     pub(crate) rest: &'a [Point],
     /// For each vertex its mirror image, x to −x.
     pub(crate) mirror: Option<&'a [u32]>,
+    /// Whether a vertex moves; empty: all do.
+    pub(crate) moves: &'a [bool],
+}
+
+impl Shape<'_> {
+    /// The part of a field of vectors that is symmetric, and zero where nothing moves.
+    fn project(&self, field: &mut [Point]) {
+        symmetrise(field, self.mirror);
+        for (x, _) in field.iter_mut().zip(self.moves).filter(|(_, moves)| !**moves) {
+            *x = Point::zeros();
+        }
+    }
 }
 
 /// Value, first and, where it is not tiny, second derivative of the barrier at width `d` over the
@@ -155,8 +167,8 @@ pub(crate) fn newton_step(shape: &Shape, points: &Points, contacts: &[Contact], 
             }
         }
     }
-    let mut step = system.solve(shape.mirror);
-    symmetrise(&mut step, shape.mirror);
+    let mut step = system.solve(shape);
+    shape.project(&mut step);
     step
 }
 
@@ -167,6 +179,15 @@ pub(crate) fn symmetrise(field: &mut [Point], mirror: Option<&[u32]>) {
     let old = field.to_vec();
     for (i, m) in mirror.iter().enumerate() {
         field[i] = (old[i] + image(&old[*m as usize])) * 0.5;
+    }
+}
+
+/// Moves those of `points` that `moves` names to where they are symmetric.
+pub(crate) fn symmetrise_points(points: &mut [Point], mirror: Option<&[u32]>, moves: &[bool]) {
+    let mut even = points.to_vec();
+    symmetrise(&mut even, mirror);
+    for ((p, even), _) in points.iter_mut().zip(even).zip(moves).filter(|(_, moves)| **moves) {
+        *p = even;
     }
 }
 
@@ -192,8 +213,8 @@ impl System {
         self.rows.iter().map(|row| row.iter().map(|(j, block)| block * x[*j as usize]).sum()).collect()
     }
 
-    /// −H⁻¹ g within the symmetric fields.
-    fn solve(&self, mirror: Option<&[u32]>) -> Vec<Point> {
+    /// −H⁻¹ g within the fields that the shape allows.
+    fn solve(&self, shape: &Shape) -> Vec<Point> {
         let n = self.gradient.len();
         let inverse: Vec<Matrix3> = (0..n)
             .map(|i| {
@@ -206,13 +227,13 @@ impl System {
             .collect();
         let apply = |r: &[Point]| {
             let mut z: Vec<Point> = r.iter().zip(&inverse).map(|(r, m)| m * r).collect();
-            symmetrise(&mut z, mirror);
+            shape.project(&mut z);
             z
         };
         let dot = |a: &[Point], b: &[Point]| a.iter().zip(b).map(|(p, q)| p.dot(q)).sum::<f64>();
         let mut x = vec![Point::zeros(); n];
         let mut r: Vec<Point> = self.gradient.iter().map(|g| -g).collect();
-        symmetrise(&mut r, mirror);
+        shape.project(&mut r);
         let mut z = apply(&r);
         let mut p = z.clone();
         let mut rho = dot(&r, &z);
@@ -222,7 +243,7 @@ impl System {
                 break;
             }
             let mut q = self.times(&p);
-            symmetrise(&mut q, mirror);
+            shape.project(&mut q);
             let bend = dot(&p, &q);
             if bend <= 0.0 {
                 break;

@@ -42,6 +42,13 @@ const STEP: f64 = 3e-3;
 const PRESSED: f64 = 0.02;
 const WAITS: usize = 4;
 
+/// Rounds in which an edited cage goes to its new sections.
+const APPROACH: usize = 60;
+
+/// Rounds in which a section that goes comes to lie straight between its neighbours, and what is straight.
+const STRAIGHTEN: usize = 100;
+const STRAIGHT: f64 = 1e-3;
+
 /// Weight against flat triangles while the cage is tightened.
 const QUALITY: f64 = 1e-4;
 /// A face with a smaller angle (degrees) is a sliver, and so often the weight against flat triangles
@@ -55,6 +62,8 @@ pub(crate) struct Inflation<'a> {
     faces: Vec<[u32; 3]>,
     edges: Vec<(u32, u32)>,
     mirror: Option<&'a [u32]>,
+    /// Whether a vertex moves; empty: all do.
+    moves: Vec<bool>,
     pub(crate) cage: Vec<Point>,
     body: Body,
 }
@@ -74,7 +83,14 @@ impl<'a> Inflation<'a> {
         edges.sort_unstable();
         edges.dedup();
         let body = Body::new(&cage, &faces);
-        Self { scaffold, faces, edges, mirror, cage, body }
+        Self { scaffold, faces, edges, mirror, moves: Vec::new(), cage, body }
+    }
+
+    /// Only these vertices move from now on.
+    pub(crate) fn hold(mut self, moves: Vec<bool>) -> Self {
+        self.body.hold(|v| moves[v as usize]);
+        self.moves = moves;
+        self
     }
 
     /// Grows from `start` around its obstacle at rest, to a gap of `least`.
@@ -176,6 +192,58 @@ impl<'a> Inflation<'a> {
         Halt { vertex: own.unwrap_or(0) as usize }
     }
 
+    /// Brings the cage toward `goal` around a resting obstacle, as far as gaps allow.
+    pub(crate) fn approach(
+        &mut self,
+        goal: &[Point],
+        obstacle: &StandIn,
+        options: &InflationOptions,
+        progress: &Part,
+    ) -> Result<(), Cancelled> {
+        let mut resting = Resting::new(obstacle, options);
+        for round in 0..APPROACH {
+            progress.reach(round as f64 / APPROACH as f64)?;
+            let weights = Weights {
+                volume: 0.0,
+                anchor: 0.02,
+                ..resting.weights(options, (options.reach, 1.0, QUALITY))
+            };
+            if self.press(&mut resting, Some(goal), weights, STEP) < 0.02 * STEP {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Brings vertices to the middle of two others, which give way.
+    pub(crate) fn straighten(
+        &mut self,
+        links: &[(u32, [u32; 2])],
+        obstacle: &StandIn,
+        options: &InflationOptions,
+        progress: &Part,
+    ) -> Result<(), Cancelled> {
+        let mut resting = Resting::new(obstacle, options);
+        for _ in 0..STRAIGHTEN {
+            progress.check()?;
+            let mut goal = self.cage.clone();
+            for (v, ends) in links {
+                let [a, b] = ends.map(|end| self.cage[end as usize]);
+                let along = b - a;
+                let t = ((self.cage[*v as usize] - a).dot(&along) / along.norm_squared().max(1e-300))
+                    .clamp(0.1, 0.9);
+                goal[*v as usize] = a + along * t;
+            }
+            let farthest = goal.iter().zip(&self.cage).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
+            if farthest < STRAIGHT {
+                break;
+            }
+            let weights = Weights { volume: 0.0, ..resting.weights(options, (options.reach, 1.0, QUALITY)) };
+            self.press(&mut resting, Some(&goal), weights, STEP);
+        }
+        Ok(())
+    }
+
     /// Tightens the cage around a resting obstacle, to a gap of the clearance and the obstacle's margin.
     pub(crate) fn tighten(
         &mut self,
@@ -189,7 +257,7 @@ impl<'a> Inflation<'a> {
         for round in 0..options.rounds {
             progress.reach(round as f64 / options.rounds as f64)?;
             let weights = resting.weights(options, (reach, stiffness, QUALITY));
-            let moved = self.press(&mut resting, weights, limit);
+            let moved = self.press(&mut resting, None, weights, limit);
             limit = (3.0 * moved).clamp(0.1 * STEP, STEP);
             if round % 8 == 7 {
                 reach = (0.6 * reach).max(4.0 * options.clearance);
@@ -219,14 +287,21 @@ impl<'a> Inflation<'a> {
             let shape = (4.0 * options.clearance, 0.05, QUALITY * 6.0_f64.powi(harder));
             for _ in 0..6 {
                 let weights = resting.weights(options, shape);
-                self.press(&mut resting, weights, STEP);
+                self.press(&mut resting, None, weights, STEP);
             }
         }
         Ok(true)
     }
 
-    /// One round around a resting obstacle: no longer than `limit`. How far anything moved.
-    fn press(&mut self, resting: &mut Resting, mut weights: Weights, limit: f64) -> f64 {
+    /// One round around a resting obstacle, from where it is or toward a goal: no longer than `limit`.
+    /// How far anything moved.
+    fn press(
+        &mut self,
+        resting: &mut Resting,
+        goal: Option<&[Point]>,
+        mut weights: Weights,
+        limit: f64,
+    ) -> f64 {
         self.body.tree.refit(&self.cage);
         let (clearance, points) = (resting.clearance, resting.points);
         let reached = weights.reach + clearance + 2.0 * limit;
@@ -234,14 +309,15 @@ impl<'a> Inflation<'a> {
         // A gap that is too narrow may become wider, never narrower than it was allowed to be.
         resting.least = clearance.min((0.5 * around.narrowest()).max(resting.least));
         weights.least = resting.least;
-        let here = self.cage.clone();
+        let here = goal.map_or_else(|| self.cage.clone(), <[Point]>::to_vec);
         self.relax(&mut around, points, &here, &weights, (2, limit))
     }
 
-    /// Of all corners of faces, degrees.
-    fn least_angle(&self) -> f64 {
+    /// Of all corners of faces that move, degrees.
+    pub(crate) fn least_angle(&self) -> f64 {
+        let moves = |t: &&[u32; 3]| t.iter().any(|v| self.moves.get(*v as usize) != Some(&false));
         let angle = |t: &[u32; 3]| least_angle(t.map(|v| self.cage[v as usize]));
-        self.faces.iter().map(angle).fold(180.0, f64::min)
+        self.faces.iter().filter(moves).map(angle).fold(180.0, f64::min)
     }
 
     /// Some Newton steps toward `goal`, together no longer than `limit`. How far anything moved.
@@ -254,7 +330,8 @@ impl<'a> Inflation<'a> {
         (rounds, limit): (usize, f64),
     ) -> f64 {
         let edges = std::mem::take(&mut self.edges);
-        let shape = Shape { faces: &self.faces, edges: &edges, rest: goal, mirror: self.mirror };
+        let (mirror, moves) = (self.mirror, &self.moves);
+        let shape = Shape { faces: &self.faces, edges: &edges, rest: goal, mirror, moves };
         let mut left = limit;
         for _ in 0..rounds {
             let points = Points { cage: &self.cage, obstacle };

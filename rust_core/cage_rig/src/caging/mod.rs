@@ -13,9 +13,12 @@ pub(crate) mod control_nodes;
 mod energy;
 mod extraction;
 pub(crate) mod field;
+mod finishing;
 mod inflation;
+mod lineage;
 mod obstacle;
 mod pruning;
+mod regrowth;
 mod report;
 mod rings;
 mod sections;
@@ -23,12 +26,14 @@ pub(crate) mod skeleton;
 mod skin;
 mod symmetry;
 mod tips;
+mod transplant;
 mod tubes;
 mod verify;
 
 pub use control_nodes::{NodeKind, Placement};
 pub use extraction::{extract_skeleton, ExtractedSkeleton};
 pub use inflation::InflationOptions;
+pub use regrowth::Earlier;
 pub use report::{ArcReport, CageReport, Laps, SectionReport};
 pub use sections::SectionOptions;
 pub use skin::{Repairs, Skin};
@@ -39,13 +44,13 @@ use crate::points::Point;
 use crate::progress::{Cancelled, Part};
 use contraction::Start;
 use control_nodes::{control_nodes, ControlNode};
+use finishing::Clock;
 use inflation::Inflation;
 use obstacle::{Mesh, Obstacles};
 use rings::STARTS;
 use sections::{Section, Traced};
 use skeleton::{curve_skeleton, CurveSkeleton};
 use std::sync::OnceLock;
-use std::time::Instant;
 use tubes::{scaffold, Scaffold};
 
 /// How a cage is generated.
@@ -99,6 +104,18 @@ pub struct Generator {
 
 /// Control nodes, their sections, and for each corner its mirror image on a symmetric character.
 type CrossSections = (Vec<ControlNode>, Vec<Section>, Option<Vec<u32>>);
+
+/// What a cage is made of.
+struct Plan {
+    nodes: Vec<ControlNode>,
+    sections: Vec<Section>,
+    /// The faces that join the sections.
+    scaffold: Scaffold,
+    /// For each corner its mirror image on a symmetric character.
+    mirror: Option<Vec<u32>>,
+    /// Nodes of the skeleton that take no part.
+    dropped: Vec<usize>,
+}
 
 /// When a cage fails with all leaves, leaves thinner than these are left out, one after the other.
 const COARSER: [f64; 2] = [0.005, 0.012];
@@ -194,8 +211,19 @@ impl Generator {
 
     /// The cage. `bending` as in [`Generator::sections`]. Without it, leaves of the skeleton are left
     /// out where no cage closes around their branching node, and thin ones (fingers) where no cage
-    /// can be grown around them; the report names their nodes as dropped.
-    pub fn generate(&self, bending: Option<&[Point]>, part: &Part) -> Result<GeneratedCage, CagingError> {
+    /// can be grown around them; the report names their nodes as dropped. What an `earlier` cage has
+    /// around the same nodes stays as it is there, where that gives a good cage.
+    pub fn generate(
+        &self,
+        bending: Option<&[Point]>,
+        earlier: Option<&Earlier>,
+        part: &Part,
+    ) -> Result<GeneratedCage, CagingError> {
+        if let Some(earlier) = earlier {
+            if let Some(found) = self.regrow(bending, earlier, part)? {
+                return Ok(found);
+            }
+        }
         let first = self.generate_with(self.skeleton.clone(), self.options.detail, bending, part);
         let fingers = |fault: &CagingError| bending.is_none() && fault.is_of_growth();
         if !first.as_ref().is_err_and(fingers) {
@@ -244,7 +272,7 @@ impl Generator {
         part: &Part,
     ) -> Result<GeneratedCage, Failure> {
         let mut clock = Clock::new();
-        let [tracing, starting, growing, tightening, checking] = part.split([1.0, 0.5, 4.0, 3.0, 0.3]);
+        let [tracing, starting, growing, finishing] = part.split([1.0, 0.5, 4.0, 3.3]);
         tracing.begin("cross sections")?;
         let (nodes, sections, mirror) = self.cross_sections(skeleton, bending, &tracing)?;
         clock.lap("sections");
@@ -254,53 +282,17 @@ impl Generator {
         let (scaffold, start) = self.start(skeleton, (&nodes, &sections), &growth.mesh, &starting)?;
         clock.lap("contraction");
         growing.begin("growing the cage")?;
-        let mut inflation = Inflation::new(&scaffold, mirror.as_deref(), start.cage.clone());
+        let plan = Plan { nodes, sections, scaffold, mirror, dropped: skeleton.dropped.clone() };
+        let mut inflation = Inflation::new(&plan.scaffold, plan.mirror.as_deref(), start.cage.clone());
         let options = &self.options.inflation;
         let grown = inflation.grow(start, options, options.clearance + growth.margin, &growing)?;
         if let Err(halt) = grown {
-            let node = nodes[scaffold.owner[halt.vertex]].node;
+            let node = plan.nodes[plan.scaffold.owner[halt.vertex]].node;
             let place = self.skin.space.leave(&inflation.cage[halt.vertex]);
             return Err(CagingError::Stuck { node, place }.into());
         }
         clock.lap("growth");
-        tightening.begin("tightening the cage")?;
-        let mut cages = vec![inflation.cage.clone()];
-        let [tightening, opening] = tightening.split([4.0, 1.0]);
-        inflation.tighten(fine, options, &tightening)?;
-        cages.push(inflation.cage.clone());
-        if inflation.open_slivers(fine, options, &opening)? {
-            cages.push(inflation.cage);
-        }
-        clock.lap("tightening");
-        checking.begin("checking the cage")?;
-        let vertices = self.last_valid(&cages, &scaffold, &nodes)?;
-        let faces = self.faces(&scaffold, &vertices);
-        clock.lap("verify");
-        let dropped = skeleton.dropped.clone();
-        let found = (&nodes[..], &sections[..], &scaffold);
-        let report = report::cage(&self.skin, found, &vertices, (mirror, dropped, clock.laps));
-        Ok(GeneratedCage { vertices, faces, report })
-    }
-
-    /// The last cage of several that the exact check passes, in the skin's space: tightening, around a
-    /// stand-in, may have lost what growth had.
-    fn last_valid(
-        &self,
-        cages: &[Vec<Point>],
-        scaffold: &Scaffold,
-        nodes: &[ControlNode],
-    ) -> Result<Vec<Point>, CagingError> {
-        let mut refused = CagingError::TooFewSections { sections: nodes.len() };
-        for cage in cages.iter().rev() {
-            let vertices: Vec<Point> = cage.iter().map(|p| self.skin.space.leave(p)).collect();
-            let (skin, triangles) = (&self.skin.original, &self.skin.triangles);
-            let Some(fault) = verify::fault(&vertices, &scaffold.triangles(), skin, triangles) else {
-                return Ok(vertices);
-            };
-            let node = nodes[scaffold.owner[fault.vertex]].node;
-            refused = CagingError::NotValid { node, place: vertices[fault.vertex], fault: fault.what };
-        }
-        Err(refused)
+        Ok(self.finish(inflation, fine, &plan, &[], (clock, &finishing))?)
     }
 
     /// The faces, and a start free of crossings: the largest rings that have one.
@@ -335,57 +327,5 @@ impl Generator {
             }
         }
         Err(fault)
-    }
-
-    /// The cage's polygons. A quad stays one where both ways to split it are valid.
-    fn faces(&self, scaffold: &Scaffold, vertices: &[Point]) -> Polygons {
-        let triangles = scaffold.triangles();
-        if self.options.triangles {
-            return Polygons::from_triangles(&triangles);
-        }
-        let tree = crate::geometry::bvh::Bvh::new(&self.skin.original, &self.skin.triangles);
-        let clear = 0.5 * self.options.inflation.clearance * self.skin.space.size;
-        let mut faces = Polygons::default();
-        for polygon in &scaffold.polygons {
-            let pieces = tubes::split(&scaffold.corners, polygon);
-            let whole = pieces.len() == 2
-                && verify::splits_either_way(
-                    &pieces,
-                    vertices,
-                    &triangles,
-                    (&self.skin.original, &self.skin.triangles),
-                    (&tree, clear),
-                );
-            if whole {
-                // Starts where a fan gives the verified triangles.
-                let [a, b, c] = pieces[0];
-                faces.corners.extend([a, b, c, pieces[1][2]].map(i64::from));
-                faces.sizes.push(4);
-            } else {
-                for t in pieces {
-                    faces.corners.extend(t.map(i64::from));
-                    faces.sizes.push(3);
-                }
-            }
-        }
-        faces
-    }
-}
-
-/// Seconds spent in each stage.
-struct Clock {
-    last: Instant,
-    laps: Laps,
-}
-
-impl Clock {
-    fn new() -> Self {
-        Self { last: Instant::now(), laps: Vec::new() }
-    }
-
-    fn lap(&mut self, stage: &'static str) {
-        let now = Instant::now();
-        self.laps.push((stage, (now - self.last).as_secs_f64()));
-        self.last = now;
     }
 }

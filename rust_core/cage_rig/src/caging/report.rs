@@ -4,7 +4,7 @@ use super::control_nodes::{ControlNode, NodeKind};
 use super::sections::Section;
 use super::skeleton::CurveSkeleton;
 use super::skin::{Repairs, Skin};
-use super::tubes::Scaffold;
+use super::Plan;
 use crate::geometry::bvh::Bvh;
 use crate::points::Point;
 use rayon::prelude::*;
@@ -14,7 +14,9 @@ use rayon::prelude::*;
 pub struct SectionReport {
     /// Bending or leaf.
     pub kind: NodeKind,
-    /// Where the control node is.
+    /// Where the control node is on its arc.
+    pub place: Point,
+    /// Beside it, in the middle of the skin.
     pub point: Point,
     /// Along its bone.
     pub direction: Point,
@@ -51,6 +53,8 @@ pub struct CageReport {
     pub vertex_sections: Vec<usize>,
     /// Skeleton nodes that take no part: outside the skin, or not sticking out.
     pub dropped: Vec<usize>,
+    /// So many vertices are where an earlier cage had them.
+    pub kept: usize,
     /// What was done to the skin.
     pub repairs: Repairs,
     /// Volume of the cage over that of the skin.
@@ -82,6 +86,7 @@ pub(super) fn sections(skin: &Skin, nodes: &[ControlNode], found: &[Section]) ->
         .zip(found)
         .map(|(node, section)| SectionReport {
             kind: node.kind,
+            place: skin.space.leave(&node.place),
             point: skin.space.leave(&node.point),
             direction: node.direction,
             radius: node.radius * skin.space.size,
@@ -95,10 +100,11 @@ pub(super) fn sections(skin: &Skin, nodes: &[ControlNode], found: &[Section]) ->
 
 pub(super) fn cage(
     skin: &Skin,
-    (nodes, found, scaffold): (&[ControlNode], &[Section], &Scaffold),
+    plan: &Plan,
     vertices: &[Point],
-    (mirror, dropped, timings): (Option<Vec<u32>>, Vec<usize>, Laps),
+    (kept, timings): (usize, Laps),
 ) -> CageReport {
+    let Plan { nodes, sections: found, scaffold, mirror, dropped } = plan;
     let unit: Vec<Point> = vertices.iter().map(|p| skin.space.enter(p)).collect();
     let faces = scaffold.triangles();
     let tree = Bvh::new(&unit, &faces);
@@ -112,14 +118,15 @@ pub(super) fn cage(
     CageReport {
         sections: sections(skin, nodes, found),
         vertex_sections: scaffold.owner.clone(),
-        dropped,
+        dropped: dropped.clone(),
+        kept,
         repairs: skin.repairs,
         volume_ratio: volume(&unit, &faces) / volume(&skin.points, &skin.triangles).abs().max(1e-300),
         mean_distance: mean_distance(skin, &unit, &faces),
         clearance: skin.points.par_iter().map(gap).reduce(|| f64::INFINITY, f64::min),
         min_angle: faces.iter().map(|t| least_angle(t.map(|v| unit[v as usize]))).fold(180.0, f64::min),
         genus: 1 - (vertices.len() as i64 - edges.len() as i64 + faces.len() as i64) / 2,
-        mirror,
+        mirror: mirror.clone(),
         timings,
     }
 }

@@ -90,6 +90,7 @@ mod tests {
         let node = |x: f64| ControlNode {
             kind: NodeKind::Bending,
             arc: 0,
+            place: Point::x() * x,
             point: Point::x() * x,
             direction: Point::x(),
             radius: 1.0,

@@ -14,6 +14,9 @@ use crate::geometry::convex_hull::hull_on_sphere;
 use crate::geometry::predicates::side;
 use crate::points::Point;
 
+/// A cage grows so far beyond its sections before it is tightened.
+pub(crate) const BEYOND: f64 = 1.05;
+
 /// The faces of a cage and the axis inside it. Unit space.
 #[derive(Debug, Clone)]
 pub(crate) struct Scaffold {
@@ -47,7 +50,7 @@ impl Scaffold {
     /// Corners on their way from the start to the sections, a little beyond at 1.
     pub(crate) fn grown(&self, part: f64) -> Vec<Point> {
         let grown = |((p, q), node): ((&Point, &Point), &usize)| {
-            let target = self.centers[*node] + (p - self.centers[*node]) * 1.05;
+            let target = self.centers[*node] + (p - self.centers[*node]) * BEYOND;
             q + (target - q) * part
         };
         self.corners.iter().zip(&self.start).zip(&self.owner).map(grown).collect()
