@@ -52,7 +52,7 @@ CLASSES = (
 )
 
 
-def _add_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
+def _samples_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     if context.mode == "OBJECT" and samples.names():
         self.layout.menu(CAGE_RIG_MT_samples.bl_idname, icon="ARMATURE_DATA")
 
@@ -63,7 +63,7 @@ def _object_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.operator(CAGE_RIG_OT_bind.bl_idname)
 
 
-def _add_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _cage_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator(CAGE_RIG_OT_generate_cage.bl_idname, text="Cage of Selected Character", icon="MESH_CUBE")
 
@@ -77,9 +77,9 @@ def _export_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 MENUS = (
-    (bpy.types.VIEW3D_MT_add, _add_menu),
+    (bpy.types.VIEW3D_MT_add, _samples_menu),
     (bpy.types.VIEW3D_MT_object, _object_menu),
-    (bpy.types.VIEW3D_MT_mesh_add, _add_menu),
+    (bpy.types.VIEW3D_MT_mesh_add, _cage_menu),
     (bpy.types.TOPBAR_MT_file_import, _import_menu),
     (bpy.types.TOPBAR_MT_file_export, _export_menu),
 )

@@ -75,3 +75,32 @@ def test_a_missing_sample_is_refused(samples: ModuleType) -> None:
     with pytest.raises(RuntimeError, match="There is no sample 'Whale' in this installation"):
         bpy.ops.cage_rig.add_sample(name="Whale")
     assert not bpy.context.scene.objects
+
+
+class Recorder:
+    """What a menu's draw function puts into a layout."""
+
+    def __init__(self) -> None:
+        self.layout, self.drawn = self, []
+
+    def menu(self, name: str, **_: object) -> None:
+        self.drawn.append(name)
+
+    def operator(self, name: str, **_: object) -> None:
+        self.drawn.append(name)
+
+    def separator(self) -> None:
+        """A line."""
+
+
+def test_the_menus_offer_samples_and_cages(samples: ModuleType) -> None:
+    import bl_ext.user_default.cage_rig.operators as operators
+
+    offered = {}
+    for menu, draw in operators.MENUS:
+        recorder = Recorder()
+        draw(recorder, bpy.context)
+        offered[menu.__name__] = recorder.drawn
+    assert offered["VIEW3D_MT_add"] == ["CAGE_RIG_MT_samples"]
+    assert offered["VIEW3D_MT_mesh_add"] == ["cage_rig.generate_cage"]
+    assert offered["VIEW3D_MT_object"] == ["cage_rig.generate_cage", "cage_rig.bind"]
