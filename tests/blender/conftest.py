@@ -13,7 +13,11 @@ import pytest
 extension.isolate()
 
 import bpy  # noqa: E402  (after the user folder is set)
-from scene import Rig, bound_bar  # noqa: E402
+from generating import uncaged  # noqa: E402
+from scene import Rig, bound_bar, select  # noqa: E402
+
+from blend_fixtures.build import RigObjects, build_character  # noqa: E402
+from blend_fixtures.small import capsule  # noqa: E402
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -57,3 +61,18 @@ def main(headless: ModuleType, tmp_path: Path) -> Main:
         return code, json.loads(answer.read_text()) if answer.exists() else {}
 
     return call
+
+
+@pytest.fixture
+def caging(installed: None) -> ModuleType:
+    import bl_ext.user_default.cage_rig.caging as caging
+
+    return caging
+
+
+@pytest.fixture
+def character() -> RigObjects:
+    """A round bar without a cage, everything selected that Generate Cage needs."""
+    found = uncaged(build_character(capsule()))
+    select([*found.skins, found.armature], found.armature)
+    return found
