@@ -384,7 +384,7 @@ impl Laplacian {
 mod tests {
     use super::*;
     use crate::caging::skeleton::curve_skeleton;
-    use crate::fixtures::shapes::square_tube;
+    use crate::fixtures::shapes::{round_tube, square_tube};
 
     #[test]
     fn the_field_rises_from_the_tube_to_the_skin() {
@@ -400,5 +400,34 @@ mod tests {
         assert!(along(0.0) == 0.0 && along(0.5) > 0.3 && along(0.5) < along(0.8) && along(0.8) < 1.0);
         let gradient = field.gradient(&(center + Point::new(0.0, 0.6, 0.0) * radius)).expect("in the window");
         assert!(gradient.normalize().y > 0.99);
+    }
+
+    #[test]
+    fn around_the_axis_of_a_round_bar_the_field_is_the_logarithm_of_the_radius() {
+        let (vertices, faces) = round_tube(10.0, 1.0, 64);
+        let skin = Skin::new(&vertices, &faces).expect("closed");
+        let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0, &[]).expect("inside");
+        let center = skin.space.enter(&Point::new(5.0, 0.0, 0.0));
+        let radius = 1.0 / skin.space.size;
+        let field = Field::new(&skin, &skeleton, &center, radius, 96);
+        let mut seen = 0;
+        for j in 0..field.size {
+            for k in 0..field.size {
+                let cell = Point::new((field.size / 2) as f64, j as f64, k as f64);
+                let p = field.origin + cell * field.spacing;
+                let r = (p - center).yz().norm() / radius;
+                if (1.5 * TUBE..0.97).contains(&r) {
+                    let exact = (r / TUBE).ln() / (1.0 / TUBE).ln();
+                    assert!(
+                        (field.value(&p) - exact).abs() < 0.03,
+                        "{} at {r}, not {exact}",
+                        field.value(&p)
+                    );
+                    seen += 1;
+                }
+            }
+        }
+        assert!(seen > 300, "{seen}");
     }
 }

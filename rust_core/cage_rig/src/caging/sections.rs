@@ -254,7 +254,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::caging::control_nodes::{control_nodes, Placement};
     use crate::caging::skeleton::curve_skeleton;
-    use crate::fixtures::shapes::square_tube;
+    use crate::fixtures::shapes::{round_tube, square_tube};
     use crate::progress::Progress;
 
     pub(crate) fn unwatched_sections(
@@ -303,6 +303,29 @@ pub(crate) mod tests {
             let nodes = control_nodes(&skin, &skeleton, Some(&bending), Placement::Joints).expect("four");
             unwatched_sections(&traced, &skin, &skeleton, &nodes, &SectionOptions::default());
             assert_eq!(traced.len(), count);
+        }
+    }
+
+    #[test]
+    fn a_round_bar_has_a_round_section() {
+        let (vertices, faces) = round_tube(10.0, 1.0, 64);
+        let skin = Skin::new(&vertices, &faces).expect("closed");
+        let bones = [Point::new(1.0, 0.0, 0.0), Point::new(9.0, 0.0, 0.0)];
+        let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0, &[]).expect("inside");
+        let nodes = control_nodes(&skin, &skeleton, Some(&[Point::new(5.0, 0.0, 0.0)]), Placement::Joints);
+        let options = SectionOptions::default();
+        let found = section(&skin, &skeleton, &nodes.expect("three")[1], &options).expect("a ring");
+        let ring: Vec<Point> = found.ring.iter().map(|p| skin.space.leave(p)).collect();
+        let middle = ring.iter().sum::<Point>() / ring.len() as f64;
+        assert!((middle - Point::new(5.0, 0.0, 0.0)).norm() < 0.03, "{middle}");
+        assert_eq!(ring.len(), SEEDS);
+        let even = std::f64::consts::TAU / SEEDS as f64;
+        for (k, p) in ring.iter().enumerate() {
+            let (out, next) = (p - middle, ring[(k + 1) % SEEDS] - middle);
+            assert!((out.norm() - 1.0).abs() < 0.03, "{p}");
+            assert!(out.x.abs() < 0.05, "{p} is not in the plane across");
+            // The lines start at a tube of a few cells, which spreads them by some degrees.
+            assert!(out.angle(&next) < 2.0 * even, "{} between two lines", out.angle(&next));
         }
     }
 }

@@ -163,7 +163,9 @@ fn edge_is_clear([p, q]: [&Point; 2], skin: &[Point], tree: &Bvh, clear: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::shapes::icosphere;
+    use crate::caging::{CagingOptions, Generator, Placement, Skin};
+    use crate::fixtures::shapes::{icosphere, torus};
+    use crate::progress::Progress;
 
     #[test]
     fn an_edge_past_a_ball_is_clear_by_its_distance() {
@@ -195,5 +197,34 @@ mod tests {
         let (cage, mut faces) = ball(1.5, 0.0);
         faces.iter_mut().for_each(|f| f.swap(0, 1));
         assert_eq!(fault(&cage, &faces, &skin, &triangles).map(|f| f.what), Some("it is inside out"));
+    }
+
+    #[test]
+    fn a_ring_gets_a_cage_with_a_hole() {
+        let (vertices, faces) = torus(48, 16, 1.0, 0.3);
+        let turn = |k: usize| (k as f64 * std::f64::consts::TAU / 12.0).sin_cos();
+        let nodes: Vec<Point> = (0..12).map(turn).map(|(s, c)| Point::new(c, s, 0.0)).collect();
+        let edges: Vec<[i64; 2]> = (0..12).map(|k| [k, (k + 1) % 12]).collect();
+        let options =
+            CagingOptions { triangles: true, placement: Placement::Joints, ..CagingOptions::default() };
+        let generator = Generator::new(&vertices, &faces, &nodes, &edges, options).expect("a loop");
+        let made = generator.generate(None, &Progress::default().whole()).expect("a cage");
+        let (points, count) = (made.vertices, made.faces.sizes.len());
+        assert_eq!(count, 2 * points.len(), "2 C - 4 + 4 g faces, g = 1");
+        assert!(points.len() > 4 * 4);
+        let corner = |k: &i64| *k as u32;
+        let triangles: Vec<[u32; 3]> =
+            made.faces.corners.chunks(3).map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]).collect();
+        let skin = Skin::new(&vertices, &faces).expect("closed");
+        assert_eq!(fault(&points, &triangles, &skin.original, &skin.triangles), None);
+        // Said by hand as well: of one part, closed and consistently turned, with an outside in the hole.
+        let mut sides: Vec<(u32, u32)> =
+            triangles.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]).collect();
+        sides.sort_unstable();
+        assert!(sides.windows(2).all(|w| w[0] != w[1]));
+        assert!(sides.iter().all(|(a, b)| sides.binary_search(&(*b, *a)).is_ok()));
+        let tree = Bvh::new(&points, &triangles);
+        assert!(vertices.iter().all(|p| tree.winding(&points, p) == 1));
+        assert_eq!(tree.winding(&points, &Point::new(1e-3, 2e-3, 3e-3)), 0, "the hole is closed");
     }
 }

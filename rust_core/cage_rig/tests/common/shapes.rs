@@ -19,6 +19,32 @@ pub fn square_tube(rings: &[(f64, f64)]) -> (Vec<Point>, Polygons) {
     (points, Polygons { corners: quads.concat(), sizes: vec![4; quads.len()] })
 }
 
+/// A round tube of `radius` along x from 0 to `length`: rings of `about` corners as far apart as these,
+/// ends closed, outward.
+pub fn round_tube(length: f64, radius: f64, about: usize) -> (Vec<Point>, Polygons) {
+    let gap = radius * std::f64::consts::TAU / about as f64;
+    let rings = (length / gap).ceil() as usize + 1;
+    let mut points = Vec::new();
+    for ring in 0..rings {
+        let x = length * ring as f64 / (rings - 1) as f64;
+        let turn = |k: usize| (k as f64 * std::f64::consts::TAU / about as f64).sin_cos();
+        points.extend((0..about).map(turn).map(|(s, c)| Point::new(x, radius * c, radius * s)));
+    }
+    let mut faces = Polygons::default();
+    for ring in 0..rings - 1 {
+        for k in 0..about {
+            let at = |ring: usize, k: usize| (ring * about + k % about) as i64;
+            faces.corners.extend([at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)]);
+            faces.sizes.push(4);
+        }
+    }
+    let last = (rings - 1) * about;
+    faces.corners.extend((0..about).rev().map(|k| k as i64));
+    faces.corners.extend((last..last + about).map(|k| k as i64));
+    faces.sizes.extend([about; 2]);
+    (points, faces)
+}
+
 /// A ring in the plane of x and y: `around` sections of `about` corners at `radius`, as thick as `tube`.
 pub fn torus(around: usize, about: usize, radius: f64, tube: f64) -> (Vec<Point>, Polygons) {
     let turn = |k: usize, n: usize| (k as f64 * std::f64::consts::TAU / n as f64).sin_cos();
