@@ -45,6 +45,7 @@ def install(context: bpy.types.Context, cage: bpy.types.Object, bound: Bound, se
         skin.snapshot = snapshot.write(f"{skin.object.name} Bind", part.points, part.faces, part.weights)
         skin.skin_to_rig = bound.skin_to_rig[index].T.tolist()
         _join(skin.object, cage)
+    layers.wait(cage)
     binding.write_known(cage, bound.snapshot.known)
     binding.mark(cage)
     settings.state = "PAUSED"  # a rig until the first update makes it live
@@ -56,7 +57,7 @@ def _join(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
     skin.cage_rig.part = "SKIN"
     ours = modifier.find(skin, cage)
     if ours is None:
-        modifier.add(skin, cage, settings.posed_cage, stack.place(skin, settings.armature))
+        modifier.add(skin, settings.posed_cage, stack.place(skin, settings.armature))
     else:
         modifier.set_inputs(ours, {"Posed Cage": settings.posed_cage})
     layers.settle(skin)
@@ -89,7 +90,6 @@ def _make_posed_cage(context: bpy.types.Context, cage: bpy.types.Object, bound: 
         mesh.name = old.name
         remove_mesh(old)
     _attach(context, obj, cage, "POSED_CAGE")
-    armature.depend_on_bones(obj, settings.armature, bound.bone_names)
 
 
 def _make_refit_armature(context: bpy.types.Context, cage: bpy.types.Object) -> None:
@@ -131,9 +131,11 @@ def remove_object(obj: bpy.types.Object | None) -> None:
 
 def leave(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
     """Take one rig off a skin; the last one gives it back as it was."""
-    others = [found for found in modifier.ours(skin) if modifier.read(found, "Rest Cage") not in (cage, None)]
+    others = [found for found in modifier.ours(skin) if modifier.cage_of(found) not in (cage, None)]
     if not others:
         stack.release(skin)
         return
     modifier.remove(skin, cage)
     layers.settle(skin)
+    for found in others:
+        layers.wait(modifier.cage_of(found))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bpy
 
-from .adapters import modifier
+from .adapters import dependence, modifier
 
 
 def below(cage: bpy.types.Object) -> list[bpy.types.Object]:
@@ -66,6 +66,36 @@ def settle(obj: bpy.types.Object) -> None:
 
 def _tops(obj: bpy.types.Object) -> list[bpy.types.Object]:
     """The rigs on the skin that none of its rigs stands on."""
-    cages = [modifier.read(found, "Rest Cage") for found in modifier.ours(obj)]
-    cages = [cage for cage in cages if cage is not None]
+    cages = _cages(obj)
     return [cage for cage in cages if not any(other.cage_rig.input == cage for other in cages)]
+
+
+def _cages(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The rest cages of the rigs on the skin."""
+    return [cage for cage in map(modifier.cage_of, modifier.ours(obj)) if cage is not None]
+
+
+def wait(cage: bpy.types.Object) -> None:
+    """Have Blender evaluate cage and bones wherever it shows a skin or the posed cage of the rig, however hidden.
+
+    A skin of another file keeps no driver: it depends on both cages by its modifier, and through the posed cage on the
+    bones, so that it is evaluated twice a frame.
+    """
+    skins, posed = skins_of(cage), cage.cage_rig.posed_cage
+    for skin in skins:
+        if is_own(skin):
+            dependence.settle(skin, [_read_from(other) for other in _cages(skin)])
+        modifier.set_inputs(modifier.find(skin, cage), {"Rest Cage": None if is_own(skin) else cage})
+    if is_own(posed):
+        far = not all(is_own(skin) for skin in skins)
+        dependence.settle(posed, [_read_from(cage)] if far else [], passed_on=True)
+        dependence.settle(posed, [] if far else [_read_from(cage)])
+
+
+def is_own(obj: bpy.types.Object) -> bool:
+    """Whether the object is this file's, and no override of another one's."""
+    return obj.library is None and obj.override_library is None
+
+
+def _read_from(cage: bpy.types.Object) -> dependence.Rig:
+    return cage, cage.cage_rig.armature, [joint.name for joint in cage.cage_rig.joints]

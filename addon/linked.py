@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import bpy
 
-from .adapters import armature, modifier
+from .adapters import modifier
 
 
 def adopt(cage: bpy.types.Object) -> bool:
@@ -25,7 +25,6 @@ def adopt(cage: bpy.types.Object) -> bool:
     own.cage_rig.part, own.cage_rig.owner = "POSED_CAGE", cage
     own.parent = settings.armature
     bpy.context.scene.collection.objects.link(own)
-    armature.depend_on_bones(own, settings.armature, [joint.name for joint in settings.joints])
     linked.hide_viewport = True
     settings.posed_cage = own
     for skin in settings.skins:

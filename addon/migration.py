@@ -12,7 +12,7 @@ from __future__ import annotations
 import bpy
 
 from . import binding, layers
-from .adapters import armature, modifier, positions
+from .adapters import modifier, positions
 
 VERSION = 2
 
@@ -43,12 +43,11 @@ def migrate(cage: bpy.types.Object) -> None:
             modifier.renew(skin)
     if settings.version >= VERSION or _home(cage) is not None:
         return
-    posed, bones = settings.posed_cage, settings.armature
-    if posed is not None and posed.type == "MESH" and bones is not None and posed.library is None:
+    posed = settings.posed_cage
+    if posed is not None and posed.type == "MESH" and posed.library is None:
         if not posed.data.is_editmode:
             positions.add_layers(posed.data, binding.MEMORY)
         for constraint in [found for found in posed.constraints if found.type == "ARMATURE"]:
             posed.constraints.remove(constraint)  # of no influence; the driver took its place
-        armature.depend_on_bones(posed, bones, [joint.name for joint in settings.joints])
     binding.mark(cage)
     settings.version = VERSION

@@ -75,6 +75,7 @@ class CageRigSuspended(bpy.types.PropertyGroup):
     name: StringProperty(name="Modifier", override=OVERRIDABLE)
     show_viewport: BoolProperty(override=OVERRIDABLE)
     show_render: BoolProperty(override=OVERRIDABLE)
+    rests: BoolProperty(description="Whether its vertex groups were taken from it", override=OVERRIDABLE)
 
 
 class CageRigSkin(bpy.types.PropertyGroup):

@@ -207,16 +207,22 @@ def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> boo
     if trouble:
         _pause(cage, trouble)
         return False
-    if cage.session_uid not in _running or cage.cage_rig.state == "PAUSED":
+    anew = cage.session_uid not in _running or cage.cage_rig.state == "PAUSED"
+    if anew:
         migration.migrate(cage)
     if linked.adopt(cage):
         registry.forget()
+        anew = True
     for obj in layers.skins_of(cage):
         layers.settle(obj)
     trouble = health.problem(cage)
     if trouble:
         _pause(cage, trouble)
-    return not trouble
+        return False
+    if anew:
+        layers.wait(cage)
+    stack.let_suspended_rest([cage, *layers.skins_of(cage)])
+    return True
 
 
 def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:

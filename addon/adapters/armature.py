@@ -246,22 +246,6 @@ def add_helpers(obj: bpy.types.Object, context: bpy.types.Context, names: list[s
     return made
 
 
-def depend_on_bones(obj: bpy.types.Object, armature_object: bpy.types.Object, names: list[str]) -> None:
-    """Make Blender evaluate these bones wherever it evaluates `obj`, even where the armature is hidden.
-
-    Blender evaluates the bones of a hidden armature only for what depends on each of them. A driver that reads every
-    bone and always gives 0 is such a dependency; unlike a constraint it draws no relationship lines.
-    """
-    obj.driver_remove("delta_location", 0)
-    driver = obj.driver_add("delta_location", 0).driver
-    driver.type, driver.expression = "SCRIPTED", "0.0"
-    for name in names:
-        variable = driver.variables.new()
-        variable.type = "TRANSFORMS"
-        target = variable.targets[0]
-        target.id, target.bone_target = armature_object, name
-
-
 def write_refit_pose(obj: bpy.types.Object, basis: Matrices) -> None:
     """Pose the parentless refit bones, each by `basis` in its own rest space, `#J by 4 by 4`."""
     obj.pose.bones.foreach_set("matrix_basis", basis.transpose(0, 2, 1).astype(np.float32).ravel())

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The "Cage Rig" Geometry Nodes modifiers on a skin, one for each of its rigs, and the feed.
 
-Base coordinates are never written. The modifier takes the rest cage and the posed cage as object inputs, which is what
-makes Blender evaluate them (and, through a driver on the posed cage, every bone) when they are hidden.
+Base coordinates are never written. The posed cage, an object input, says which rig a modifier is of. Where the skin can
+keep no driver (`dependence`) the rest cage is an input too, so that Blender evaluates both for the skin.
 """
 
 from __future__ import annotations
@@ -31,7 +31,13 @@ def is_emptied(modifier: bpy.types.Modifier) -> bool:
 
 def find(skin: bpy.types.Object, cage: bpy.types.Object) -> bpy.types.Modifier | None:
     """The skin's modifier of the rig of this cage, or None."""
-    return next((modifier for modifier in ours(skin) if read(modifier, "Rest Cage") == cage), None)
+    return next((modifier for modifier in ours(skin) if cage_of(modifier) == cage), None)
+
+
+def cage_of(modifier: bpy.types.Modifier) -> bpy.types.Object | None:
+    """The rest cage of the rig that the modifier is of; None where its posed cage was deleted."""
+    posed = read(modifier, "Posed Cage")
+    return read(modifier, "Rest Cage") if posed is None else posed.cage_rig.owner
 
 
 def read(modifier: bpy.types.Modifier, name: str) -> Any:
@@ -50,18 +56,19 @@ def set_inputs(modifier: bpy.types.Modifier, values: dict[str, Any]) -> bool:
     return not changed
 
 
-def add(skin: bpy.types.Object, rest_cage: bpy.types.Object, posed_cage: bpy.types.Object, index: int) -> None:
+def add(skin: bpy.types.Object, posed_cage: bpy.types.Object, index: int) -> None:
     """Add the modifier of a rig to the skin at place `index` of its stack, without a feed.
 
-    It takes the place of one of ours whose node group was deleted.
+    It takes the place of one of ours whose node group or posed cage was deleted.
     """
-    for emptied in [found for found in skin.modifiers if is_emptied(found) and found.name.startswith(NAME)]:
+    nameless = [found for found in skin.modifiers if is_emptied(found) and found.name.startswith(NAME)]
+    for emptied in nameless + [found for found in ours(skin) if cage_of(found) is None]:
         index -= list(skin.modifiers).index(emptied) < index
         skin.modifiers.remove(emptied)
     modifier = skin.modifiers.new(NAME, "NODES")
     modifier.node_group = node_group()
     modifier.show_in_editmode = False  # there the base mesh is edited, and the feed can't be written
-    set_inputs(modifier, {"Rest Cage": rest_cage, "Posed Cage": posed_cage})
+    set_inputs(modifier, {"Posed Cage": posed_cage})
     skin.modifiers.move(len(skin.modifiers) - 1, index)
 
 
@@ -150,7 +157,7 @@ def _own_feed(skin: bpy.types.Object) -> bpy.types.Object:
 def remove(skin: bpy.types.Object, cage: bpy.types.Object | None) -> None:
     """Take the modifier of a rig off the skin (None: all of ours), and what nothing uses any more."""
     for modifier in ours(skin):
-        if cage is None or read(modifier, "Rest Cage") == cage:
+        if cage is None or cage_of(modifier) in (cage, None):
             group, feed = modifier.node_group, read(modifier, "Feed")
             skin.modifiers.remove(modifier)
             if group.users == 0 and group.library is None:

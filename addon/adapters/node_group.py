@@ -3,8 +3,8 @@
 
 It places vertices where the feed says: a point attribute of the mesh, or, where the mesh can't be written because it is
 linked from another file, the vertices of a feed object. Without a feed it moves nothing. On request it keeps what it is
-given (positions, a mask) as attributes of its result, for the next update to read. It takes the rest cage and the posed
-cage as inputs so that Blender evaluates them, also where they are hidden.
+given (positions, a mask) as attributes of its result, for the next update to read. It takes cages as inputs: the posed
+cage names the rig, and what is an input is evaluated, also where it is hidden.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from . import dependence
 from .modifier import is_emptied, ours, read, remove
 
 # Modifiers that touch no vertex.
@@ -55,11 +56,34 @@ def preserves_volume(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
 
 def show_suspended(obj: bpy.types.Object, shown: bool) -> None:
     """While a rig is paused its suspended modifiers do their work again (`shown`), as they were before the bind."""
-    for record in obj.cage_rig.suspended:
-        modifier = obj.modifiers.get(record.name)
-        if modifier is not None:
-            modifier.show_viewport = shown and record.show_viewport
-            modifier.show_render = shown and record.show_render
+    for modifier, record in _suspended(obj):
+        modifier.show_viewport = shown and record.show_viewport
+        modifier.show_render = shown and record.show_render
+        _let_rest(modifier, record, not shown)
+
+
+def let_suspended_rest(objects: list[bpy.types.Object]) -> None:
+    """Take bones from suspended modifiers that are hidden, and give them back to those that somebody shows.
+
+    An Armature modifier makes its mesh wait for the bones of its vertex groups even where it is hidden, so that the
+    mesh would be evaluated before the bones are read and once more after.
+    """
+    for obj in objects:
+        for modifier, record in _suspended(obj):
+            _let_rest(modifier, record, not (modifier.show_viewport or modifier.show_render))
+
+
+def _let_rest(modifier: bpy.types.Modifier, record: bpy.types.PropertyGroup, rest: bool) -> None:
+    own = modifier.id_data.library is None and modifier.id_data.override_library is None
+    if own and rest and not record.rests and modifier.use_vertex_groups and not modifier.use_bone_envelopes:
+        modifier.use_vertex_groups, record.rests = False, True
+    elif record.rests and not rest:
+        modifier.use_vertex_groups, record.rests = True, False
+
+
+def _suspended(obj: bpy.types.Object) -> list[tuple[bpy.types.Modifier, bpy.types.PropertyGroup]]:
+    found = [(obj.modifiers.get(record.name), record) for record in obj.cage_rig.suspended]
+    return [(modifier, record) for modifier, record in found if modifier is not None and modifier.type == "ARMATURE"]
 
 
 def restore_suspended(obj: bpy.types.Object) -> None:
@@ -125,4 +149,5 @@ def release(skin: bpy.types.Object) -> None:
     """Give a skin back as it was before all binds: our modifiers and feed off, its Armature modifier on again."""
     remove(skin, None)
     restore_suspended(skin)
+    dependence.settle(skin, [])
     skin.property_unset("cage_rig")

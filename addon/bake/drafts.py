@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import bpy
 
-from ..adapters import modifier, stack
+from ..adapters import dependence, modifier, stack
 from .live import Skin
 
 
@@ -33,6 +33,7 @@ class Draft:
         self.add(obj.data)
         obj.name = obj.data.name = name
         obj.property_unset("cage_rig")
+        dependence.settle(obj, [])
         obj.hide_viewport = obj.hide_select = False
         self.objects.append(obj)
         return obj

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import bpy
 import numpy as np
 import pytest
-from scene import Rig, rest, shown, update
+from scene import Rig, rest, select, shown, update
 
 
 def key_pose(rig: Rig) -> None:
@@ -178,3 +178,56 @@ def test_a_rig_out_of_the_view_layer_is_not_evaluated(bar: Rig) -> None:
     layer.exclude = False
     update()
     assert np.abs(shown(bar.skin) - expected).max() < 1e-6
+
+
+@pytest.fixture
+def first_evaluation() -> Iterator[list[str]]:
+    """The names of objects whose geometry Blender has evaluated in a frame before our handler runs."""
+    found: list[str] = []
+
+    def look(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        updates = [update for update in depsgraph.updates if update.is_updated_geometry]
+        found.extend(update.id.name for update in updates if isinstance(update.id, bpy.types.Object))
+
+    bpy.app.handlers.frame_change_post.insert(0, look)
+    yield found
+    bpy.app.handlers.frame_change_post.remove(look)
+
+
+def test_a_frame_evaluates_the_skin_once_when_its_points_are_written(bar: Rig, first_evaluation: list[str]) -> None:
+    key_pose(bar)
+    bpy.context.scene.frame_set(2)
+    before = shown(bar.skin).copy()
+    first_evaluation.clear()
+    bpy.context.scene.frame_set(3)
+    assert bar.armature.name in first_evaluation and bar.skin.name not in first_evaluation
+    assert np.abs(shown(bar.skin) - before).max() > 1e-3
+
+
+def test_hidden_cages_and_bones_are_evaluated_for_whatever_is_shown(bar: Rig) -> None:
+    key_pose(bar)
+    bpy.context.scene.frame_set(6)
+    skin, posed = shown(bar.skin).copy(), rest(bar.posed).copy()
+    for visible, expected in ((bar.skin, skin), (bar.posed, posed)):
+        bpy.context.scene.frame_set(1)
+        for obj in (bar.skin, bar.posed, bar.cage, bar.armature, bar.refit):
+            obj.hide_viewport = obj != visible
+        update()
+        bpy.context.scene.frame_set(6)
+        found = shown(bar.skin) if visible == bar.skin else rest(bar.posed)
+        assert np.abs(found - expected).max() < 1e-6, visible.name
+
+
+def test_an_armature_modifier_has_its_vertex_groups_while_somebody_shows_it(bar: Rig) -> None:
+    native = bar.skin.modifiers["Armature"]
+    assert not native.use_vertex_groups and native.object == bar.armature
+    native.show_viewport = True
+    update()
+    assert native.use_vertex_groups
+    native.show_viewport = False
+    update()
+    assert not native.use_vertex_groups
+    select([bar.cage], bar.cage)
+    bpy.ops.cage_rig.unbind()
+    assert native.use_vertex_groups and native.show_viewport
+    assert not bar.skin.animation_data or not bar.skin.animation_data.drivers

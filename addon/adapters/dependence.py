@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender has to evaluate for a rig wherever it shows an object, however cage and bones are hidden.
+
+Blender evaluates what is hidden only for what depends on it: the bones of a hidden armature for what depends on each of
+them. A driver that reads every bone and the cage and gives what was there anyway is such a dependency; unlike a
+constraint it draws no relationship lines. On a property that means nothing to a mesh it costs no more: the mesh itself
+does not wait, and is evaluated once a frame, when its points are written. Where others depend on the object in turn it
+has to be on the object's place.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+PROPERTY = "empty_display_size"
+PLACE = "delta_location"
+Rig = tuple[bpy.types.Object, bpy.types.Object, list[str]]  # rest cage, armature, names of bones
+
+
+def settle(obj: bpy.types.Object, rigs: list[Rig], *, passed_on: bool = False) -> None:
+    """Let `obj`, and what depends on its place where that is `passed_on`, wait for these rigs and no others."""
+    found = _driver(obj, PLACE if passed_on else PROPERTY)
+    wanted = [end for cage, bones, names in rigs for end in [(cage, ""), *((bones, name) for name in names)]]
+    if ([] if found is None else [_end(variable) for variable in found.variables]) == wanted:
+        return
+    if found is not None:
+        obj.driver_remove(*((PLACE, 0) if passed_on else (PROPERTY,)))
+    if not wanted:
+        return
+    driver = (obj.driver_add(PLACE, 0) if passed_on else obj.driver_add(PROPERTY)).driver
+    driver.type, driver.expression = "SCRIPTED", "0.0" if passed_on else "1.0"
+    for target, bone in wanted:
+        variable = driver.variables.new()
+        variable.type = "TRANSFORMS" if bone else "SINGLE_PROP"
+        variable.targets[0].id = target
+        if bone:
+            variable.targets[0].bone_target = bone
+        else:
+            variable.targets[0].data_path = "dimensions[0]"
+
+
+def _driver(obj: bpy.types.Object, path: str) -> bpy.types.Driver | None:
+    curves = obj.animation_data.drivers if obj.animation_data is not None else []
+    return next((curve.driver for curve in curves if curve.data_path == path), None)
+
+
+def _end(variable: bpy.types.DriverVariable) -> tuple[bpy.types.Object | None, str]:
+    target = variable.targets[0]
+    return target.id, target.bone_target if variable.type == "TRANSFORMS" else ""
