@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When Blender calls us. Each handler is a door to `sync` or `leftovers` and nothing more."""
+"""When Blender calls us. Each handler is a door to `sync`, `leftovers` or `saving` and nothing more."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import atexit
 import bpy
 from bpy.app.handlers import persistent
 
-from . import leftovers, sync
+from . import leftovers, saving, sync
 
 
 @persistent
@@ -72,6 +72,17 @@ def load_post(*_: object) -> None:
 @persistent
 def save_pre(*_: object) -> None:
     leftovers.drop()
+    saving.begin()
+
+
+@persistent
+def save_post(*_: object) -> None:
+    saving.end()
+
+
+@persistent
+def save_post_fail(*_: object) -> None:
+    saving.end()
 
 
 HANDLERS = (
@@ -86,6 +97,8 @@ HANDLERS = (
     render_cancel,
     load_post,
     save_pre,
+    save_post,
+    save_post_fail,
 )
 
 

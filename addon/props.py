@@ -73,6 +73,7 @@ class CageRigSuspended(bpy.types.PropertyGroup):
     """A modifier that Cage Rig switched off, and how it was. `name` is the modifier's name."""
 
     name: StringProperty(name="Modifier", override=OVERRIDABLE)
+    uid: IntProperty(description="The modifier's persistent number, which it keeps when renamed", override=OVERRIDABLE)
     show_viewport: BoolProperty(override=OVERRIDABLE)
     show_render: BoolProperty(override=OVERRIDABLE)
     rests: BoolProperty(description="Whether its vertex groups were taken from it", override=OVERRIDABLE)

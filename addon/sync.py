@@ -350,8 +350,9 @@ def _choose_key(cage: bpy.types.Object) -> None:
 
 
 def _refuse_deformed_cage(cage: bpy.types.Object) -> None:
+    suspended = stack.suspended_names(cage)
     for mod in cage.modifiers:
-        if mod.show_viewport and mod.name not in cage.cage_rig.suspended:
+        if mod.show_viewport and mod.name not in suspended:
             raise shape_keys.KeyRefusal(
                 f"Modifier '{mod.name}' of '{cage.name}' deforms the rest cage, so the posed cage can't be edited; "
                 "switch it off in the viewport or apply it"

@@ -63,7 +63,8 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "repair": ({"bpy"}, {"adapters", "lifecycle"}),
     "selection": ({"bpy", "mathutils"}, {"lifecycle", "props"}),
     "leftovers": ({"bpy"}, {"adapters", "registry", "sync"}),
-    "handlers": ({"bpy"}, {"leftovers", "sync"}),
+    "saving": ({"bpy"}, {"adapters", "layers", "registry"}),
+    "handlers": ({"bpy"}, {"leftovers", "saving", "sync"}),
     "operators": (
         {"bpy"},
         {

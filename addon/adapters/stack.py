@@ -25,11 +25,12 @@ GROWING = {"ARRAY", "MIRROR", "MULTIRES", "SOLIDIFY", "SUBSURF", "TRIANGULATE"}
 
 def suspend_armature(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     """Switch off Armature modifiers of `armature`, which would deform twice, and remember how they were."""
+    known = suspended_names(obj)
     for modifier in obj.modifiers:
         if modifier.type == "ARMATURE" and modifier.object == armature:
-            if modifier.name not in obj.cage_rig.suspended:
+            if modifier.name not in known:
                 record = obj.cage_rig.suspended.add()
-                record.name = modifier.name
+                record.name, record.uid = modifier.name, modifier.persistent_uid
                 record.show_viewport, record.show_render = modifier.show_viewport, modifier.show_render
             modifier.show_viewport = modifier.show_render = False
 
@@ -73,6 +74,13 @@ def let_suspended_rest(objects: list[bpy.types.Object]) -> None:
             _let_rest(modifier, record, not (modifier.show_viewport or modifier.show_render))
 
 
+def wake_suspended(objects: list[bpy.types.Object]) -> None:
+    """Give suspended modifiers their bones back, however hidden they are."""
+    for obj in objects:
+        for modifier, record in _suspended(obj):
+            _let_rest(modifier, record, False)
+
+
 def _let_rest(modifier: bpy.types.Modifier, record: bpy.types.PropertyGroup, rest: bool) -> None:
     own = modifier.id_data.library is None and modifier.id_data.override_library is None
     if own and rest and not record.rests and modifier.use_vertex_groups and not modifier.use_bone_envelopes:
@@ -82,8 +90,16 @@ def _let_rest(modifier: bpy.types.Modifier, record: bpy.types.PropertyGroup, res
 
 
 def _suspended(obj: bpy.types.Object) -> list[tuple[bpy.types.Modifier, bpy.types.PropertyGroup]]:
-    found = [(obj.modifiers.get(record.name), record) for record in obj.cage_rig.suspended]
+    """The suspended modifiers that are still there, under whatever names, with how they were."""
+    by_uid = {modifier.persistent_uid: modifier for modifier in obj.modifiers}
+    records = obj.cage_rig.suspended
+    found = [(by_uid.get(record.uid, obj.modifiers.get(record.name)), record) for record in records]
     return [(modifier, record) for modifier, record in found if modifier is not None and modifier.type == "ARMATURE"]
+
+
+def suspended_names(obj: bpy.types.Object) -> set[str]:
+    """The present names of the suspended modifiers."""
+    return {modifier.name for modifier, _ in _suspended(obj)}
 
 
 def restore_suspended(obj: bpy.types.Object) -> None:

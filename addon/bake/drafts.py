@@ -44,7 +44,7 @@ class Draft:
         Returns it with the place in its modifiers where the one was that places the vertices. Its shape keys are still
         there.
         """
-        source, suspended = skin.obj, {record.name for record in skin.obj.cage_rig.suspended}
+        source, suspended = skin.obj, stack.suspended_names(skin.obj)
         leader = list(source.modifiers).index(modifier.find(source, skin.cage))
         ours = {mod.name for mod in modifier.ours(source)}
         obj = self.copy(source, name)

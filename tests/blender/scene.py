@@ -112,7 +112,10 @@ def file_state() -> dict[str, object]:
             "matrix": [tuple(row) for row in obj.matrix_world],
             "parent": obj.parent.name if obj.parent else None,
             "collections": sorted(c.name for c in obj.users_collection),
-            "modifiers": [(m.name, m.type, m.show_viewport, m.show_render) for m in obj.modifiers],
+            "modifiers": [
+                (m.name, m.type, m.show_viewport, m.show_render, getattr(m, "use_vertex_groups", None))
+                for m in obj.modifiers
+            ],
             "groups": [g.name for g in obj.vertex_groups],
             "constraints": [c.name for c in obj.constraints],
             "state": (obj.cage_rig.state, obj.cage_rig.part, obj.cage_rig.owner, len(obj.cage_rig.suspended)),
@@ -209,7 +212,8 @@ def fresh(rig: Rig) -> list[Points]:
 def unwatched() -> Iterator[None]:
     """Cage Rig's handlers are silent: what is done to a file meanwhile, nobody mends or refuses."""
     handlers = bpy.app.handlers
-    names = ("depsgraph_update_post", "frame_change_post", "load_post", "save_pre", "undo_post", "redo_post")
+    names = ("depsgraph_update_post", "frame_change_post", "load_post", "undo_post", "redo_post")
+    names += ("save_pre", "save_post", "save_post_fail")
     before = {name: list(getattr(handlers, name)) for name in names}
     for name in names:
         getattr(handlers, name).clear()
