@@ -82,3 +82,29 @@ def test_a_node_that_is_moved_still_gives_a_cage():
         moved[at] += way * bending[at]["radius"] * bending[at]["direction"]
         vertices, triangles, report = generator.generate(moved).result()
         check(skin, vertices, triangles, report)
+
+
+def test_tessellations_of_one_character_get_the_same_sections():
+    """Limb by limb: one rig, and a hundred times as many triangles."""
+    found = []
+    for name in ("human_2k_53b", "human_200k_53b"):
+        sections = core.cage_sections(*load(name))
+        arcs = sorted({s["arc"] for s in sections})
+        found.append([[s["kind"] for s in sections if s["arc"] == arc] for arc in arcs])
+    assert found[0] == found[1]
+    assert len(found[0]) == 16
+
+
+@pytest.mark.parametrize(("name", "leaves"), [("human_24k_52b", 5), ("fox_576_24b", 6), ("proc_octopus_20k_66b", 9)])
+def test_a_skeleton_found_in_a_skin_is_one_tree(name, leaves):
+    skin, faces, _, _ = load(name)
+    nodes, edges = core.extract_skeleton(skin, faces)
+    reached = {0}
+    for _ in nodes:
+        reached |= {int(v) for edge in edges if reached & set(edge.tolist()) for v in edge}
+    assert len(reached) == len(nodes) == len(edges) + 1
+    assert np.count_nonzero(np.bincount(edges.ravel()) == 1) == leaves
+    if name != "proc_octopus_20k_66b":  # which is not symmetric
+        image = nodes * [-1, 1, 1] + [skin[:, 0].min() + skin[:, 0].max(), 0, 0]
+        apart = np.linalg.norm(image[:, None] - nodes[None], axis=2)
+        assert apart.min(axis=1).max() < 1e-6 * np.linalg.norm(np.ptp(skin, axis=0))

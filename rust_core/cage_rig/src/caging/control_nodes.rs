@@ -12,6 +12,14 @@ use super::tips::THIN;
 use crate::error::CagingError;
 use crate::points::{first_unusable, Point};
 
+/// Nodes at joints, and others, are so far apart, in radii of the inscribed ball.
+const CLOSE: f64 = 0.9;
+const APART: f64 = 1.2;
+/// A bend leaves the chord by so many radii. Tessellations of one character differ by a third of one:
+/// where less counted, they would get other cages. A limb without any node takes slighter bends.
+const BEND: f64 = 0.51;
+const SLIGHT: f64 = 0.35;
+
 /// How bending nodes are placed where the user gives none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Placement {
@@ -159,7 +167,8 @@ fn placed(skin: &Skin, skeleton: &CurveSkeleton, at: usize, placement: Placement
     let is_leaf = |side: usize| skeleton.junctions[arc.ends[side]].degree == 1;
     let mut from = if is_leaf(0) { 0.0 } else { leaves_lump(skin, skeleton, at, 0) };
     let mut to = length - if is_leaf(1) { 0.0 } else { leaves_lump(skin, skeleton, at, 1) };
-    let gap = |s: f64| 0.9 * arc.radius_at(s);
+    let apart = if placement == Placement::Joints { CLOSE } else { APART };
+    let gap = |s: f64| apart * arc.radius_at(s);
     if to - from < gap(0.5 * (from + to)) {
         let both = !is_leaf(0) && !is_leaf(1);
         return if both { vec![(0.5 * (from + to)).clamp(0.1 * length, 0.9 * length)] } else { Vec::new() };
@@ -181,7 +190,8 @@ fn placed(skin: &Skin, skeleton: &CurveSkeleton, at: usize, placement: Placement
         }
         Placement::Automatic => {
             let mut found = Vec::new();
-            bends(arc, from.max(0.0), to.min(length), 0, &mut found);
+            let bend = if places.is_empty() { SLIGHT } else { BEND };
+            bends(arc, (from.max(0.0), to.min(length)), bend, 0, &mut found);
             found
         }
     };
@@ -195,8 +205,8 @@ fn placed(skin: &Skin, skeleton: &CurveSkeleton, at: usize, placement: Placement
     places
 }
 
-/// Where the course of position and radius leaves the chord from `a` to `b` by a third of the radius.
-fn bends(arc: &Arc, a: f64, b: f64, depth: usize, found: &mut Vec<f64>) {
+/// Where the course of position and radius leaves the chord from `a` to `b` by so many radii.
+fn bends(arc: &Arc, (a, b): (f64, f64), bend: f64, depth: usize, found: &mut Vec<f64>) {
     let value = |s: f64| {
         let p = arc.at(s);
         [p.x, p.y, p.z, 0.7 * arc.radius_at(s)]
@@ -208,10 +218,10 @@ fn bends(arc: &Arc, a: f64, b: f64, depth: usize, found: &mut Vec<f64>) {
     };
     let samples = (1..32).map(|k| a + (b - a) * f64::from(k) / 32.0);
     let Some(worst) = samples.max_by(|s, t| miss(*s).total_cmp(&miss(*t))) else { return };
-    if depth < 4 && b - a > 1.5 * arc.radius_at(worst) && miss(worst) > 0.35 * median(arc.radii.clone()) {
+    if depth < 4 && b - a > 1.5 * arc.radius_at(worst) && miss(worst) > bend * median(arc.radii.clone()) {
         found.push(worst);
-        bends(arc, a, worst, depth + 1, found);
-        bends(arc, worst, b, depth + 1, found);
+        bends(arc, (a, worst), bend, depth + 1, found);
+        bends(arc, (worst, b), bend, depth + 1, found);
     }
 }
 

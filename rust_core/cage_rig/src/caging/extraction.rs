@@ -12,7 +12,7 @@ use crate::error::CagingError;
 use crate::mesh::Polygons;
 use crate::points::Point;
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::{BTreeSet, BinaryHeap, HashMap};
 
 /// Bands from one end to the other, fewer on a coarse mesh.
 const BANDS: f64 = 48.0;
@@ -45,11 +45,8 @@ pub fn extract_skeleton(vertices: &[Point], faces: &Polygons) -> Result<Extracte
     let Mesh { points, triangles } = mesh;
     let around = neighbours(points.len(), &triangles);
     let distance = surface_distance(&points, &around, skin.symmetric);
-    let mut rings = rings(&points, &around, &distance);
-    if skin.symmetric {
-        rings = mirrored(&skin, &rings);
-    }
-    let graph = thin(&skin, rings);
+    let (rings, middle) = rings(&points, &around, &distance, skin.symmetric);
+    let graph = thin(&skin, if skin.symmetric { mirrored(&rings, &middle) } else { rings });
     if graph.edges.is_empty() {
         return Err(CagingError::SkeletonEmpty);
     }
@@ -155,8 +152,10 @@ impl Graph {
     }
 }
 
-/// The middles of the connected parts of bands, linked where they touch.
-fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64]) -> Graph {
+/// The middles of the connected parts of bands, linked where they touch, and whether each reaches the
+/// plane x = 0. `half`: of what is on its greater side, where parts that are one in the whole and reach
+/// the plane are one.
+fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64], half: bool) -> (Graph, Vec<bool>) {
     let far = distance.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
     // No edge may reach past the next band, or a ring falls apart.
     let reach =
@@ -164,47 +163,80 @@ fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64]) -> Graph {
     let finite = (0..points.len()).filter(|v| distance[*v].is_finite());
     let width = finite.map(reach).fold(far / BANDS, f64::max).max(1e-300);
     let band = |v: usize| (distance[v] / width).floor() as usize;
-    let mut ring = vec![usize::MAX; points.len()];
-    let mut graph = Graph::default();
     let in_part = |v: usize| distance[v].is_finite() && !around[v].is_empty();
-    for start in (0..points.len()).filter(|v| in_part(*v)) {
-        if ring[start] != usize::MAX {
+    let beyond = |v: usize| half && points[v].x < 0.0;
+    let kept = |v: usize| in_part(v) && !beyond(v);
+    let alike = |v: usize, w: usize| band(v) == band(w);
+    let whole = parts(around, in_part, alike);
+    let wholes = group(&whole);
+    let (mut at, mut of_whole) = (vec![usize::MAX; points.len()], HashMap::new());
+    let (mut graph, mut middle) = (Graph::default(), Vec::new());
+    let center = |ring: &[usize]| ring.iter().map(|v| points[*v]).sum::<Point>() / ring.len() as f64;
+    for part in group(&parts(around, kept, alike)) {
+        let reaches = part.iter().any(|v| around[*v].iter().any(|w| beyond(*w as usize)));
+        let (new, ring) = (graph.points.len(), whole[part[0]]);
+        let node = if reaches { *of_whole.entry(ring).or_insert(new) } else { new };
+        if node == new {
+            graph.points.push(center(if reaches { &wholes[ring] } else { &part }));
+            middle.push(reaches);
+        }
+        part.iter().for_each(|v| at[*v] = node);
+    }
+    for (v, near) in around.iter().enumerate().filter(|(v, _)| kept(*v)) {
+        for w in near.iter().map(|w| *w as usize).filter(|w| kept(*w)) {
+            graph.link(at[v], at[w]);
+        }
+    }
+    (graph, middle)
+}
+
+/// For each vertex that is `inside` the number of its part: what is connected and `alike`.
+fn parts(
+    around: &[Vec<u32>],
+    inside: impl Fn(usize) -> bool,
+    alike: impl Fn(usize, usize) -> bool,
+) -> Vec<usize> {
+    let mut part = vec![usize::MAX; around.len()];
+    let mut count = 0;
+    for start in 0..around.len() {
+        if part[start] != usize::MAX || !inside(start) {
             continue;
         }
-        let at = graph.points.len();
-        let (mut stack, mut sum, mut count) = (vec![start], Point::zeros(), 0.0);
-        ring[start] = at;
+        part[start] = count;
+        let mut stack = vec![start];
         while let Some(v) = stack.pop() {
-            (sum, count) = (sum + points[v], count + 1.0);
             for w in around[v].iter().map(|w| *w as usize) {
-                if ring[w] == usize::MAX && band(w) == band(start) {
-                    ring[w] = at;
+                if part[w] == usize::MAX && inside(w) && alike(v, w) {
+                    part[w] = count;
                     stack.push(w);
                 }
             }
         }
-        graph.points.push(sum / count);
+        count += 1;
     }
-    for (v, near) in around.iter().enumerate().filter(|(v, _)| in_part(*v)) {
-        for w in near {
-            graph.link(ring[v], ring[*w as usize]);
-        }
-    }
-    graph
+    part
 }
 
-/// The half of the graph with x > 0 and its mirror image, joined by what is in the middle.
-fn mirrored(skin: &Skin, graph: &Graph) -> Graph {
-    let count = graph.points.len();
-    let middle: Vec<bool> = graph.points.iter().map(|p| p.x.abs() < 0.5 * skin.depth(p)).collect();
+/// The vertices of each part.
+fn group(part: &[usize]) -> Vec<Vec<usize>> {
+    let count = part.iter().filter(|p| **p != usize::MAX).max().map_or(0, |p| p + 1);
+    let mut found = vec![Vec::new(); count];
+    for (v, p) in part.iter().enumerate().filter(|(_, p)| **p != usize::MAX) {
+        found[*p].push(v);
+    }
+    found
+}
+
+/// Half a graph and its mirror image, joined by what reaches the plane. Where the half is a tree, so is
+/// the whole, unless the skin leaves the plane and comes back to it.
+fn mirrored(half: &Graph, middle: &[bool]) -> Graph {
+    let count = half.points.len();
     let mut both = Graph::default();
     let on_plane = |p: &Point| Point::new(0.0, p.y, p.z);
-    both.points
-        .extend((0..count).map(|i| if middle[i] { on_plane(&graph.points[i]) } else { graph.points[i] }));
-    both.points.extend(graph.points.iter().map(symmetry::image));
+    both.points.extend(half.points.iter().zip(middle).map(|(p, m)| if *m { on_plane(p) } else { *p }));
+    both.points.extend(half.points.iter().map(symmetry::image));
     let other = |i: usize| if middle[i] { i } else { i + count };
-    let kept = |i: usize| middle[i] || graph.points[i].x > 0.0;
-    for &(a, b) in graph.edges.iter().filter(|(a, b)| kept(*a) && kept(*b)) {
+    for &(a, b) in &half.edges {
         both.link(a, b);
         both.link(other(a), other(b));
     }

@@ -9,7 +9,7 @@ use super::contacts::{contacts, narrower, Body, Contact, Points};
 use super::contraction::Start;
 use super::energy::{energy, newton_step, Shape, Weights};
 use super::obstacle::{Mesh, StandIn};
-use super::report::least_angle;
+use super::report::{least_angle, volume};
 use super::tubes::Scaffold;
 use crate::geometry::collision::free_part;
 use crate::points::Point;
@@ -25,7 +25,7 @@ pub struct InflationOptions {
     pub clearance: f64,
     /// Strength of the final pressure; 0 leaves the cage as it grew.
     pub tightness: f64,
-    /// Newton steps of the final tightening.
+    /// Newton steps of the final tightening; more, while the volume falls.
     pub rounds: usize,
 }
 
@@ -48,6 +48,11 @@ const APPROACH: usize = 60;
 /// Rounds in which a section that goes comes to lie straight between its neighbours, and what is straight.
 const STRAIGHTEN: usize = 100;
 const STRAIGHT: f64 = 1e-3;
+
+/// A cage is tightened so many times longer while its volume falls below this part in so many rounds.
+const MORE: usize = 5;
+const FALLING: f64 = 0.995;
+const CHECKED: usize = 8;
 
 /// Weight against flat triangles while the cage is tightened.
 const QUALITY: f64 = 1e-4;
@@ -254,8 +259,16 @@ impl<'a> Inflation<'a> {
         let mut resting = Resting::new(obstacle, options);
         let mut reach = options.reach;
         let (mut stiffness, mut limit) = (0.3, STEP);
-        for round in 0..options.rounds {
+        let mut last = f64::INFINITY;
+        for round in 0..MORE * options.rounds {
             progress.reach(round as f64 / options.rounds as f64)?;
+            if round % CHECKED == 0 {
+                let now = volume(&self.cage, &self.faces);
+                if round >= options.rounds && now > FALLING * last {
+                    break;
+                }
+                last = now;
+            }
             let weights = resting.weights(options, (reach, stiffness, QUALITY));
             let moved = self.press(&mut resting, None, weights, limit);
             limit = (3.0 * moved).clamp(0.1 * STEP, STEP);

@@ -131,7 +131,7 @@ pub(super) fn cage(
     }
 }
 
-fn volume(points: &[Point], faces: &[[u32; 3]]) -> f64 {
+pub(super) fn volume(points: &[Point], faces: &[[u32; 3]]) -> f64 {
     faces
         .iter()
         .map(|t| {

@@ -208,7 +208,7 @@ mod tests {
         let options =
             CagingOptions { triangles: true, placement: Placement::Joints, ..CagingOptions::default() };
         let generator = Generator::new(&vertices, &faces, &nodes, &edges, options).expect("a loop");
-        let made = generator.generate(None, &Progress::default().whole()).expect("a cage");
+        let made = generator.generate(None, None, &Progress::default().whole()).expect("a cage");
         let (points, count) = (made.vertices, made.faces.sizes.len());
         assert_eq!(count, 2 * points.len(), "2 C - 4 + 4 g faces, g = 1");
         assert!(points.len() > 4 * 4);
