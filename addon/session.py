@@ -140,11 +140,12 @@ class Session:
     @_door
     def play(self, cage: Points, transforms: Matrices, rest_joints: Matrices, influence: float = 1.0) -> None:
         """Set the rest cage (`#C by 3`, rig space) and the animation's transforms (`#J by 4 by 4`) together."""
+        points: NDArray[np.floating[Any]] = cage
         if influence != 1.0:
             base = self.snapshot.cage.astype(np.float64)
-            cage = base + influence * (cage.astype(np.float64) - base)
+            points = base + influence * (cage.astype(np.float64) - base)
         self.influence = influence
-        self.revision += self.rig.play(cage, transforms, rest_joints)
+        self.revision += self.rig.play(points, transforms, rest_joints)
 
     @_door
     def set_method(self, name: str) -> None:
