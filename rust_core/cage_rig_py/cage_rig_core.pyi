@@ -20,6 +20,7 @@ Weights: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike, ArrayLike]
 __all__ = [
     "ArrayError",
     "BindJob",
+    "Bones",
     "CageError",
     "CageGenerator",
     "CageRigError",
