@@ -7,51 +7,16 @@ any moment; they are rebuilt from the .blend.
 
 from __future__ import annotations
 
-import enum
-from dataclasses import dataclass, field
-from typing import Any
-
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from . import binding, choosing, glance, health, layers, linked, migration, registry, skins
-from .adapters import armature, cage_keys, modifier, positions, shape_keys, stack
+from . import binding, choosing, glance, health, layers, linked, migration, posed_edits, registry, showing, skins
+from .adapters import armature, modifier, positions, stack
+from .running import Event, Matrix, Points, Running
 from .session import Below, Session, SessionCrash, SessionError
 from .session import transforms as transforms_of
 
-Points = NDArray[np.float32]
-Matrix = NDArray[np.float64]
-
-
-class Event(enum.Enum):
-    """What made Blender call us."""
-
-    EDIT = enum.auto()  # a change in the viewport: both cages and the bones may be edits
-    FRAME = enum.auto()  # playback, scrubbing, render, export: cage and pose are set together
-    RESTORED = enum.auto()  # undo, redo, load, bind: the data is the truth, whatever we knew
-
-
-@dataclass
-class _Running:
-    """A session, and what of Blender it has seen, so that the next change can be told apart."""
-
-    session: Session
-    bind_id: str  # of the snapshot that the session was made from
-    cage: Points | None = None  # rest cage, rig space, as last read
-    cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
-    posed: Points | None = None  # posed cage as last read or written
-    stale: bool = False  # the posed cage's mesh is not that of this pose: it was hidden
-    memory: bytes = b""  # what the edit mesh of the posed cage remembers
-    refit_bones: Any = None  # the core's, once they were read
-    cage_to_rig: Matrix | None = None  # once it was read
-    bones: glance.Bones | None = None  # as last read
-    seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
-    places: skins.Places = field(default_factory=dict)
-    written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
-
-
-_running: dict[int, _Running] = {}
+_running: dict[int, Running] = {}
 _busy = False
 _restoring = False
 _rendering = False
@@ -129,7 +94,7 @@ def restored() -> None:
 def start(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, session: Session) -> None:
     """After a bind: show the rig, which runs in the session that the bind computed."""
     drop(cage)
-    _running[cage.session_uid] = _Running(session, cage.cage_rig.bind_id)
+    _running[cage.session_uid] = Running(session, cage.cage_rig.bind_id)
     update(cage, depsgraph, Event.RESTORED)
 
 
@@ -183,7 +148,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     if not (source.is_evaluated and bones.is_evaluated):
         return  # in no view of this depsgraph: nothing of it is shown
     if running is None or running.bind_id != cage.cage_rig.bind_id:  # an undo may bring back another bind
-        running = _running[cage.session_uid] = _Running(binding.bound_anew(cage), cage.cage_rig.bind_id)
+        running = _running[cage.session_uid] = Running(binding.bound_anew(cage), cage.cage_rig.bind_id)
         event = Event.RESTORED
     if event is Event.RESTORED:
         running.written.clear()
@@ -191,7 +156,11 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     if not known:
         running.seen = None
     note = _advance(cage, running, depsgraph, event)
-    _write_back(cage, running, depsgraph)
+    showing.write(cage, running, depsgraph)
+    if running.stale:
+        _stale.add(registry.key_of(cage))
+    else:
+        _stale.discard(registry.key_of(cage))
     if not known:
         _resume(cage, note)
         running.seen = glance.seen(cage) if glance.is_plain(cage) else None
@@ -225,7 +194,7 @@ def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> boo
     return True
 
 
-def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:
+def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph, event: Event) -> str:
     """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
     session, settings = running.session, cage.cage_rig
     session.stand_on(_below(cage))
@@ -253,17 +222,17 @@ def _advance(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Dep
         if memory is not None:
             running.cage, running.posed = rest, posed
             session.play(memory[0], transforms, rest_joints, influence)
-            return _recall(cage, running, *memory)
+            return posed_edits.recall(cage, running, *memory)
     posed_changed = running.posed is None or not np.array_equal(posed, running.posed)
-    is_edit = posed_changed and _posed_is_edit(cage, event, rest_changed)
+    is_edit = posed_changed and posed_edits.is_edit(cage, event, rest_changed)
     if rest_changed:
         running.cage, running.cage_wanted = rest, None
-    known = running.cage if running.cage_wanted is None else running.cage_wanted
+    known = running.wanted()
     session.play(known, transforms, rest_joints, influence)
     before, running.posed = running.posed, posed
     if is_edit and running.stale and before is not None:
         posed = session.posed_cage() + (posed - before)  # made on the shape of another pose
-    return _take_posed_edit(cage, running, posed) if is_edit else ""
+    return posed_edits.take(cage, running, posed) if is_edit else ""
 
 
 def _below(cage: bpy.types.Object) -> Below | None:
@@ -276,102 +245,14 @@ def _below(cage: bpy.types.Object) -> Below | None:
     return binding.below(cage, _running[lower.session_uid].session)
 
 
-def _recall(cage: bpy.types.Object, running: _Running, rest: Points, posed: Points) -> str:
-    """After an undo in Edit Mode of the posed cage: back to the `rest` that its edit mesh remembers.
-
-    Where the vertices are not at the remembered `posed`, the step was saved after a move and before it was synced: the
-    move is made again.
-    """
-    move = running.posed - posed
-    if not positions.close(running.posed, posed, 1e-6 * running.session.size):
-        return _take_posed_edit(cage, running, running.session.posed_cage() + move)
-    if not positions.close(rest, running.cage, 1e-6 * running.session.size):
-        try:
-            _move_rest_cage(cage, running.cage, rest)
-        except shape_keys.KeyRefusal as error:
-            running.posed = None
-            return str(error)
-    running.cage_wanted = rest
-    return ""
-
-
-def _is_known(running: _Running, rest: Points) -> bool:
+def _is_known(running: Running, rest: Points) -> bool:
     """Whether the rest cage is the one of the last update, or the one that an edit of the posed cage wrote."""
     if running.cage_wanted is not None:
         return positions.close(rest, running.cage_wanted, 1e-6 * running.session.size)
     return running.cage is not None and np.array_equal(rest, running.cage)
 
 
-def _posed_is_edit(cage: bpy.types.Object, event: Event, rest_changed: bool) -> bool:
-    """Whether a changed posed cage is the artist's edit, and not what a pose, a key or an undo made of it.
-
-    In Edit Mode its edit mesh is the truth, undo included, unless the rest cage is the one in the artist's hands. In
-    Sculpt Mode an undo restores that mesh alone too.
-    """
-    if event is Event.FRAME:
-        return False
-    if not cage.cage_rig.posed_cage.data.is_editmode:
-        if event is Event.RESTORED:
-            return cage.cage_rig.posed_cage.mode == "SCULPT"
-        return not rest_changed
-    if event is Event.RESTORED:
-        return True
-    return not (rest_changed and cage.data.is_editmode and bpy.context.view_layer.objects.active == cage)
-
-
-def _take_posed_edit(cage: bpy.types.Object, running: _Running, posed: Points) -> str:
-    """The artist moved the posed cage: move the rest cage so that it goes there, or say why that can't be."""
-    if positions.close(posed, running.session.posed_cage(), 1e-6 * running.session.size):
-        return ""
-    keyed = not cage.data.is_editmode and cage_keys.takes_edits(cage)
-    try:
-        if not cage.data.is_editmode:
-            if not keyed:
-                shape_keys.key_share(cage)
-            _refuse_deformed_cage(cage)
-        wanted = running.session.edit_posed_cage(posed)
-    except (shape_keys.KeyRefusal, SessionError) as error:
-        if isinstance(error, SessionCrash):
-            raise
-        running.posed = None
-        return str(error)
-    before = running.cage if running.cage_wanted is None else running.cage_wanted
-    _move_rest_cage(cage, before, wanted)
-    running.cage_wanted = wanted.astype(np.float32)
-    return ""
-
-
-def _choose_key(cage: bpy.types.Object) -> None:
-    """Where the rest cage is keyed, an edit belongs to the key at this frame, or waits to be keyed."""
-    if cage_keys.takes_edits(cage):
-        scene = bpy.context.scene
-        auto = scene.tool_settings.use_keyframe_insert_auto
-        cage_keys.activate(cage, scene.frame_current_final, auto=auto)
-
-
-def _refuse_deformed_cage(cage: bpy.types.Object) -> None:
-    suspended = stack.suspended_names(cage)
-    for mod in cage.modifiers:
-        if mod.show_viewport and mod.name not in suspended:
-            raise shape_keys.KeyRefusal(
-                f"Modifier '{mod.name}' of '{cage.name}' deforms the rest cage, so the posed cage can't be edited; "
-                "switch it off in the viewport or apply it"
-            )
-
-
-def _move_rest_cage(cage: bpy.types.Object, before: Points, wanted: Matrix) -> None:
-    if linked.own_mesh(cage):
-        registry.forget()
-    from_rig = np.linalg.inv(_matrix(cage.cage_rig.cage_to_rig))
-    if cage.data.is_editmode:
-        positions.write_edit_mesh(cage.data, positions.apply_matrix(from_rig, wanted))
-    else:
-        _choose_key(cage)
-        delta = (wanted - before) @ from_rig[:3, :3].T
-        shape_keys.move(cage, delta.astype(np.float32))
-
-
-def _read_rest_cage(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> Points:
+def _read_rest_cage(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> Points:
     if running.cage_to_rig is None:
         running.cage_to_rig = _matrix(cage.cage_rig.cage_to_rig)
     if cage.data.is_editmode:
@@ -385,7 +266,7 @@ def _read_posed_cage(posed: bpy.types.Object) -> Points:
     return positions.read_edit_mesh(posed.data) if posed.data.is_editmode else positions.read_base(posed.data)
 
 
-def _read_pose(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, Matrix]:
+def _read_pose(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, Matrix]:
     """Transforms T (`#J by 4 by 4`) of the evaluated pose, and the rest joints (`#J by 3`) they are measured at."""
     obj = cage.cage_rig.armature.evaluated_get(depsgraph)
     if running.seen is None or running.bones is None:
@@ -411,71 +292,11 @@ def _tag_again() -> None:
             cage.update_tag()
 
 
-def _write_back(cage: bpy.types.Object, running: _Running, depsgraph: bpy.types.Depsgraph) -> None:
-    settings = cage.cage_rig
-    plain = running.seen is not None
-    live = [(k, skin.object) for k, skin in enumerate(settings.skins)] if plain else health.live_skins(cage)
-    skins.write(live, cage, running.session, depsgraph, running.written, running.places)
-    key, posed = registry.key_of(cage), settings.posed_cage
-    running.stale = not _is_shown(posed, depsgraph)
-    if running.stale:
-        _stale.add(key)
-    else:
-        _stale.discard(key)
-        _write_posed_cage(running, posed)
-        _remember(running, posed)
-    _write_refit(running, settings.refit_armature)
-
-
-def _is_shown(posed: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
-    """Whether anybody sees the posed cage, or has it in hand: a hidden one is not fitted."""
-    if posed.data.is_editmode:
-        return True
-    if depsgraph.mode == "RENDER":
-        return not posed.hide_render
-    return posed.visible_get(view_layer=depsgraph.view_layer)
-
-
 def _is_back(key: registry.Key) -> bool:
     """Whether the posed cage of this rig was hidden and is shown again."""
     cage = registry.find(key)
     posed = None if cage is None else cage.cage_rig.posed_cage
     return posed is not None and posed.visible_get()
-
-
-def _write_posed_cage(running: _Running, posed: bpy.types.Object) -> None:
-    """Write C′ where it differs from what the mesh holds. What the artist holds in Edit Mode is left alone."""
-    points, editing = running.session.posed_cage(), posed.data.is_editmode
-    if running.posed is not None:
-        tolerance = 1e-6 * running.session.size
-        same = positions.close(points, running.posed, tolerance) if editing else np.array_equal(points, running.posed)
-        if same:
-            return
-    write = positions.write_edit_mesh if editing else positions.write_base
-    write(posed.data, points)
-    running.posed = points
-
-
-def _remember(running: _Running, posed: bpy.types.Object) -> None:
-    if not posed.data.is_editmode:
-        running.memory = b""
-        return
-    rest = running.cage if running.cage_wanted is None else running.cage_wanted
-    memory = rest.tobytes() + running.posed.tobytes()
-    if memory != running.memory:
-        positions.write_edit_layers(posed.data, dict(zip(binding.MEMORY, (rest, running.posed), strict=True)))
-        running.memory = memory
-
-
-def _write_refit(running: _Running, refit: bpy.types.Object | None) -> None:
-    if refit is None or refit.mode == "EDIT" or len(refit.data.bones) != len(running.session.snapshot.heads):
-        return
-    if running.refit_bones is None:
-        running.refit_bones = running.session.refit_bones(armature.read_rest_matrices(refit.data))
-    state = (running.session.revision, b"")
-    if running.written.get(-1) != state:
-        armature.write_refit_pose(refit, running.session.refit_pose(running.refit_bones))
-        running.written[-1] = state
 
 
 def _matrix(matrix: object) -> Matrix:

@@ -28,10 +28,13 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "migration": ({"bpy"}, {"adapters", "binding", "layers"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
+    "running": ({"numpy"}, {"glance", "session", "skins"}),
+    "posed_edits": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "running", "session"}),
+    "showing": ({"bpy", "numpy"}, {"adapters", "binding", "health", "running", "skins"}),
     "sync": (
         {"bpy", "numpy"},
         {"adapters", "binding", "choosing", "glance", "health", "layers", "linked", "migration"}
-        | {"registry", "session", "skins"},
+        | {"posed_edits", "registry", "running", "session", "showing", "skins"},
     ),
     "generator": ({"cage_rig_core", "hashlib", "numpy"}, set()),
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig that runs: its session, and what of Blender it has seen, so that the next change can be told apart."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import glance, skins
+from .session import Session
+
+Points = NDArray[np.float32]
+Matrix = NDArray[np.float64]
+
+
+class Event(enum.Enum):
+    """What made Blender call us."""
+
+    EDIT = enum.auto()  # a change in the viewport: both cages and the bones may be edits
+    FRAME = enum.auto()  # playback, scrubbing, render, export: cage and pose are set together
+    RESTORED = enum.auto()  # undo, redo, load, bind: the data is the truth, whatever we knew
+
+
+@dataclass
+class Running:
+    """One rig, from its bind or load until its session is dropped."""
+
+    session: Session
+    bind_id: str  # of the snapshot that the session was made from
+    cage: Points | None = None  # rest cage, rig space, as last read
+    cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
+    posed: Points | None = None  # posed cage as last read or written
+    stale: bool = False  # the posed cage's mesh is not that of this pose: it was hidden
+    memory: bytes = b""  # what the edit mesh of the posed cage remembers
+    refit_bones: Any = None  # the core's, once they were read
+    cage_to_rig: Matrix | None = None  # once it was read
+    bones: glance.Bones | None = None  # as last read
+    seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
+    places: skins.Places = field(default_factory=dict)
+    written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
+
+    def wanted(self) -> Points:
+        """The rest cage that Blender has, or will have when what was written is read."""
+        return self.cage if self.cage_wanted is None else self.cage_wanted

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a rig shows, written where it differs from what is there: skins, posed cage, refit bones."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from . import binding, health, skins
+from .adapters import armature, positions
+from .running import Running
+
+
+def write(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> None:
+    """After a session was played: its points into skins, posed cage and refit bones. A posed cage that nobody sees is
+    not fitted, and `running` is `stale` then.
+    """
+    settings = cage.cage_rig
+    plain = running.seen is not None
+    live = [(k, skin.object) for k, skin in enumerate(settings.skins)] if plain else health.live_skins(cage)
+    skins.write(live, cage, running.session, depsgraph, running.written, running.places)
+    posed = settings.posed_cage
+    running.stale = not _is_shown(posed, depsgraph)
+    if not running.stale:
+        _write_posed_cage(running, posed)
+        _remember(running, posed)
+    _write_refit(running, settings.refit_armature)
+
+
+def _is_shown(posed: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether anybody sees the posed cage, or has it in hand: a hidden one is not fitted."""
+    if posed.data.is_editmode:
+        return True
+    if depsgraph.mode == "RENDER":
+        return not posed.hide_render
+    return posed.visible_get(view_layer=depsgraph.view_layer)
+
+
+def _write_posed_cage(running: Running, posed: bpy.types.Object) -> None:
+    """Write C′ where it differs from what the mesh holds. What the artist holds in Edit Mode is left alone."""
+    points, editing = running.session.posed_cage(), posed.data.is_editmode
+    if running.posed is not None:
+        tolerance = 1e-6 * running.session.size
+        same = positions.close(points, running.posed, tolerance) if editing else np.array_equal(points, running.posed)
+        if same:
+            return
+    write = positions.write_edit_mesh if editing else positions.write_base
+    write(posed.data, points)
+    running.posed = points
+
+
+def _remember(running: Running, posed: bpy.types.Object) -> None:
+    if not posed.data.is_editmode:
+        running.memory = b""
+        return
+    rest = running.wanted()
+    memory = rest.tobytes() + running.posed.tobytes()
+    if memory != running.memory:
+        positions.write_edit_layers(posed.data, dict(zip(binding.MEMORY, (rest, running.posed), strict=True)))
+        running.memory = memory
+
+
+def _write_refit(running: Running, refit: bpy.types.Object | None) -> None:
+    if refit is None or refit.mode == "EDIT" or len(refit.data.bones) != len(running.session.snapshot.heads):
+        return
+    if running.refit_bones is None:
+        running.refit_bones = running.session.refit_bones(armature.read_rest_matrices(refit.data))
+    state = (running.session.revision, b"")
+    if running.written.get(-1) != state:
+        armature.write_refit_pose(refit, running.session.refit_pose(running.refit_bones))
+        running.written[-1] = state
