@@ -25,7 +25,6 @@ class Bones:
     pose_order: NDArray[np.int64] | None  # #J, among `pose.bones`; None: as they are
     rest: NDArray[np.float64]  # #J by 4 by 4
     core: Any  # the same, the core's
-    heads: NDArray[np.float64]  # #J by 3
 
 
 def read_bones(cage: bpy.types.Object, evaluated: bpy.types.Object, known: Bones | None) -> Bones:
@@ -35,7 +34,7 @@ def read_bones(cage: bpy.types.Object, evaluated: bpy.types.Object, known: Bones
     as_they_are = np.array_equal(pose_order, np.arange(len(evaluated.pose.bones)))
     same = known is not None and np.array_equal(known.rest, rest)
     core = known.core if same else session.bones(rest)
-    return Bones(None if as_they_are else pose_order, rest, core, rest[:, :3, 3].copy())
+    return Bones(None if as_they_are else pose_order, rest, core)
 
 
 def seen(cage: bpy.types.Object) -> tuple[object, ...] | None:

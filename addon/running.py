@@ -7,6 +7,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import Any
 
+import bpy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,17 +32,23 @@ class Running:
 
     session: Session
     bind_id: str  # of the snapshot that the session was made from
+    cage_to_rig: Matrix | None  # None: the identity
     cage: Points | None = None  # rest cage, rig space, as last read
     cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
     posed: Points | None = None  # posed cage as last read or written
     stale: bool = False  # the posed cage's mesh is not that of this pose: it was hidden
     memory: bytes = b""  # what the edit mesh of the posed cage remembers
     refit_bones: Any = None  # the core's, once they were read
-    cage_to_rig: Matrix | None = None  # once it was read
     bones: glance.Bones | None = None  # as last read
     seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
     places: skins.Places = field(default_factory=dict)
     written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, cage: bpy.types.Object, session: Session) -> Running:
+        """The rig of this rest cage, bound in `session`."""
+        matrix = np.array(cage.cage_rig.cage_to_rig, np.float64)
+        return cls(session, cage.cage_rig.bind_id, None if np.array_equal(matrix, np.eye(4)) else matrix)
 
     def wanted(self) -> Points:
         """The rest cage that Blender has, or will have when what was written is read."""

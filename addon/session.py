@@ -22,6 +22,7 @@ Points = NDArray[np.float32]
 Mask = NDArray[np.float32]
 Faces = tuple[NDArray[np.int32], NDArray[np.int32]]
 Matrices = NDArray[np.float64]
+Bones = cage_rig_core.Bones  # rest matrices of joints
 
 
 class SessionError(Exception):
@@ -140,12 +141,19 @@ class Session:
     @_door
     def play(self, cage: Points, transforms: Matrices, rest_joints: Matrices, influence: float = 1.0) -> None:
         """Set the rest cage (`#C by 3`, rig space) and the animation's transforms (`#J by 4 by 4`) together."""
-        points: NDArray[np.floating[Any]] = cage
-        if influence != 1.0:
-            base = self.snapshot.cage.astype(np.float64)
-            points = base + influence * (cage.astype(np.float64) - base)
+        self.revision += self.rig.play(self._influenced(cage, influence), transforms, rest_joints)
+
+    @_door
+    def play_posed(self, cage: Points, bones: Bones, posed: NDArray[np.floating[Any]], influence: float = 1.0) -> None:
+        """`play` where the animation's bones are `posed`, matrices (`#J by 4 by 4`) in rig space."""
+        self.revision += self.rig.play_posed(self._influenced(cage, influence), bones, posed)
+
+    def _influenced(self, cage: Points, influence: float) -> NDArray[np.floating[Any]]:
         self.influence = influence
-        self.revision += self.rig.play(points, transforms, rest_joints)
+        if influence == 1.0:
+            return cage
+        base = self.snapshot.cage.astype(np.float64)
+        return base + influence * (cage.astype(np.float64) - base)
 
     @_door
     def set_method(self, name: str) -> None:
@@ -312,7 +320,7 @@ class Session:
         return np.asarray(self.rig.posed_joints), np.asarray(self.rig.posed_joints + along)
 
     @_door
-    def refit_bones(self, rest: Matrices) -> cage_rig_core.Bones:
+    def refit_bones(self, rest: Matrices) -> Bones:
         """The bones of a refit armature from their rest matrices, `#J by 4 by 4`.
 
         One whose tail was its child's head at bind is stretched along itself to reach the child's refit joint.
@@ -322,7 +330,7 @@ class Session:
         return cage_rig_core.Bones(rest, links, np.maximum(lengths, 1e-12))
 
     @_door
-    def refit_pose(self, bones: cage_rig_core.Bones) -> Matrices:
+    def refit_pose(self, bones: Bones) -> Matrices:
         """What poses the `refit_bones`, each in its own rest space, `#J by 4 by 4`: orientation of the animation, head
         at the refit joint.
         """
@@ -361,15 +369,9 @@ class BindJob:
 
 
 @_door
-def bones(rest: Matrices) -> cage_rig_core.Bones:
+def bones(rest: Matrices) -> Bones:
     """The animation's bones from their rest matrices, `#J by 4 by 4`."""
     return cage_rig_core.Bones(rest)
-
-
-@_door
-def transforms(rest: cage_rig_core.Bones, posed: Matrices) -> Matrices:
-    """Transforms T where these bones are `posed`, both `#J by 4 by 4`; the identity where one rests."""
-    return rest.transforms(posed)
 
 
 @_door

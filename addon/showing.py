@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
 
 from . import binding, health, skins
 from .adapters import armature, positions
@@ -41,7 +40,7 @@ def _write_posed_cage(running: Running, posed: bpy.types.Object) -> None:
     points, editing = running.session.posed_cage(), posed.data.is_editmode
     if running.posed is not None:
         tolerance = 1e-6 * running.session.size
-        same = positions.close(points, running.posed, tolerance) if editing else np.array_equal(points, running.posed)
+        same = positions.close(points, running.posed, tolerance) if editing else positions.same(points, running.posed)
         if same:
             return
     write = positions.write_edit_mesh if editing else positions.write_base

@@ -8,13 +8,11 @@ any moment; they are rebuilt from the .blend.
 from __future__ import annotations
 
 import bpy
-import numpy as np
 
 from . import binding, choosing, glance, health, layers, linked, migration, posed_edits, registry, showing, skins
 from .adapters import armature, modifier, positions, stack
 from .running import Event, Matrix, Points, Running
-from .session import Below, Session, SessionCrash, SessionError
-from .session import transforms as transforms_of
+from .session import Below, Bones, Session, SessionCrash, SessionError
 
 _running: dict[int, Running] = {}
 _busy = False
@@ -94,7 +92,7 @@ def restored() -> None:
 def start(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, session: Session) -> None:
     """After a bind: show the rig, which runs in the session that the bind computed."""
     drop(cage)
-    _running[cage.session_uid] = Running(session, cage.cage_rig.bind_id)
+    _running[cage.session_uid] = Running.of(cage, session)
     update(cage, depsgraph, Event.RESTORED)
 
 
@@ -148,7 +146,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     if not (source.is_evaluated and bones.is_evaluated):
         return  # in no view of this depsgraph: nothing of it is shown
     if running is None or running.bind_id != cage.cage_rig.bind_id:  # an undo may bring back another bind
-        running = _running[cage.session_uid] = Running(binding.bound_anew(cage), cage.cage_rig.bind_id)
+        running = _running[cage.session_uid] = Running.of(cage, binding.bound_anew(cage))
         event = Event.RESTORED
     if event is Event.RESTORED:
         running.written.clear()
@@ -206,7 +204,7 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
     session.mask_skins(shape.masks)
     if not shape.complete:
         _ask_again(cage)
-    transforms, rest_joints = _read_pose(cage, running, depsgraph)
+    bones, pose = _read_pose(cage, running, depsgraph)
     shown = cage.evaluated_get(depsgraph).cage_rig  # both may be animated
     influence = float(shown.influence)
     later = event is Event.RESTORED or choosing.is_by_hand(cage) or choosing.progress(cage) is not None
@@ -221,14 +219,14 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
         memory = positions.read_edit_layers(settings.posed_cage.data, binding.MEMORY)
         if memory is not None:
             running.cage, running.posed = rest, posed
-            session.play(memory[0], transforms, rest_joints, influence)
+            session.play_posed(memory[0], bones, pose, influence)
             return posed_edits.recall(cage, running, *memory)
-    posed_changed = running.posed is None or not np.array_equal(posed, running.posed)
+    posed_changed = running.posed is None or not positions.same(posed, running.posed)
     is_edit = posed_changed and posed_edits.is_edit(cage, event, rest_changed)
     if rest_changed:
         running.cage, running.cage_wanted = rest, None
     known = running.wanted()
-    session.play(known, transforms, rest_joints, influence)
+    session.play_posed(known, bones, pose, influence)
     before, running.posed = running.posed, posed
     if is_edit and running.stale and before is not None:
         posed = session.posed_cage() + (posed - before)  # made on the shape of another pose
@@ -249,25 +247,23 @@ def _is_known(running: Running, rest: Points) -> bool:
     """Whether the rest cage is the one of the last update, or the one that an edit of the posed cage wrote."""
     if running.cage_wanted is not None:
         return positions.close(rest, running.cage_wanted, 1e-6 * running.session.size)
-    return running.cage is not None and np.array_equal(rest, running.cage)
+    return running.cage is not None and positions.same(rest, running.cage)
 
 
 def _read_rest_cage(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> Points:
-    if running.cage_to_rig is None:
-        running.cage_to_rig = _matrix(cage.cage_rig.cage_to_rig)
     if cage.data.is_editmode:
         points = positions.read_edit_mesh(cage.data)
     else:
         points = positions.read_evaluated(cage, depsgraph)
-    return positions.apply_matrix(running.cage_to_rig, points)
+    return points if running.cage_to_rig is None else positions.apply_matrix(running.cage_to_rig, points)
 
 
 def _read_posed_cage(posed: bpy.types.Object) -> Points:
     return positions.read_edit_mesh(posed.data) if posed.data.is_editmode else positions.read_base(posed.data)
 
 
-def _read_pose(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, Matrix]:
-    """Transforms T (`#J by 4 by 4`) of the evaluated pose, and the rest joints (`#J by 3`) they are measured at."""
+def _read_pose(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> tuple[Bones, Matrix]:
+    """The joints' bones at rest, and where they are in the evaluated pose (`#J by 4 by 4`)."""
     obj = cage.cage_rig.armature.evaluated_get(depsgraph)
     if running.seen is None or running.bones is None:
         running.bones = glance.read_bones(cage, obj, running.bones)
@@ -275,7 +271,7 @@ def _read_pose(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.De
     posed = armature.read_pose_matrices(obj)
     if bones.pose_order is not None:
         posed = posed[bones.pose_order]
-    return transforms_of(bones.core, posed), bones.heads
+    return bones.core, posed
 
 
 def _ask_again(cage: bpy.types.Object) -> None:
@@ -297,10 +293,6 @@ def _is_back(key: registry.Key) -> bool:
     cage = registry.find(key)
     posed = None if cage is None else cage.cage_rig.posed_cage
     return posed is not None and posed.visible_get()
-
-
-def _matrix(matrix: object) -> Matrix:
-    return np.array(matrix, np.float64)
 
 
 def _pause(cage: bpy.types.Object, message: str) -> None:

@@ -28,7 +28,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "migration": ({"bpy"}, {"adapters", "binding", "layers"}),
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
-    "running": ({"numpy"}, {"glance", "session", "skins"}),
+    "running": ({"bpy", "numpy"}, {"glance", "session", "skins"}),
     "posed_edits": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "running", "session"}),
     "showing": ({"bpy", "numpy"}, {"adapters", "binding", "health", "running", "skins"}),
     "sync": (

@@ -112,6 +112,11 @@ def fill(mesh: bpy.types.Mesh, points: Points, faces: tuple[NDArray[np.int32], N
     mesh.update(calc_edges=True)
 
 
+def same(one: Points, other: Points) -> bool:
+    """Whether two arrays of one type are the same, bit for bit. On a cage several times faster than `array_equal`."""
+    return one.tobytes() == other.tobytes()
+
+
 def close(one: NDArray[np.floating], other: NDArray[np.floating], tolerance: float) -> bool:
     """Whether no coordinate of two arrays of one shape differs by more; what is no number differs."""
     return bool(np.abs(one - other).max() <= tolerance)

@@ -154,6 +154,7 @@ class CoupledRig:
         transforms: ArrayLike,
         rest_joints: ArrayLike | None = None,
     ) -> bool: ...  # whether anything of it was new
+    def play_posed(self, cage: ArrayLike, bones: Bones, posed: ArrayLike) -> bool: ...  # (#J, 4, 4) where bones are
     def offset_rest_skin(self, offsets: ArrayLike | None) -> None: ...
     def mask_skin(self, mask: ArrayLike | None) -> None: ...  # (#M,), 0 to 1: where the cage acts
     def carry(

@@ -330,10 +330,10 @@ def test_a_panic_of_the_core_pauses_and_rebind_starts_anew(bar: Rig, monkeypatch
     class Panicking:
         method = "lbs"
 
-        def play(self, *_: object) -> None:
+        def play_posed(self, *_: object) -> None:
             raise cage_rig_core.PanicException("index out of bounds")
 
-        offset_rest_skin = play
+        offset_rest_skin = play_posed
 
     monkeypatch.setattr(sync._running[bar.cage.session_uid].session, "rig", Panicking())
     bend(bar, 1.0)

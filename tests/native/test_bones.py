@@ -36,6 +36,18 @@ def test_refit_bones_stand_at_the_refit_joints_and_reach_their_children(bar, ben
     np.testing.assert_allclose(shown[0] @ [0, length, 0, 1], [*rig.posed_joints[1], 1], atol=1e-6)
 
 
+def test_playing_posed_bones_is_playing_their_transforms(bar, bent):
+    rig, other = core.CoupledRig(**bar), core.CoupledRig(**bar)
+    rest = np.tile(np.eye(4), (2, 1, 1))
+    rest[:, :3, 3] = bar["joints"]
+    bones, posed = core.Bones(rest), np.array(bent) @ rest
+    assert rig.play_posed(bar["cage_vertices"] * 1.2, bones, posed.astype(np.float32))
+    assert not rig.play_posed(bar["cage_vertices"] * 1.2, bones, posed.astype(np.float32))
+    assert other.play(bar["cage_vertices"] * 1.2, bones.transforms(posed.astype(np.float32)), bones.heads)
+    np.testing.assert_array_equal(rig.posed_skin, other.posed_skin)
+    assert np.abs(rig.posed_skin - core.CoupledRig(**bar).posed_skin).max() > 0.1
+
+
 def test_play_says_whether_anything_was_new(bar, bent):
     rig = core.CoupledRig(**bar)
     assert rig.play(bar["cage_vertices"], bent)
@@ -52,5 +64,7 @@ def test_wrong_bones_are_refused_by_name(bar):
         core.Bones(REST).transforms(REST[:1])
     with pytest.raises(ValueError, match="not finite"):
         core.Bones(REST).transforms(REST * np.nan)
+    with pytest.raises(ValueError, match="the rig has 2 joints, these are 1 bones"):
+        core.CoupledRig(**bar).play_posed(bar["cage_vertices"], core.Bones(REST[:1]), REST[:1])
     with pytest.raises(ValueError, match="the rig has 2 joints, these are 1 bones"):
         core.CoupledRig(**bar).refit_pose(core.Bones(REST[:1]))

@@ -6,8 +6,8 @@ use crate::errors::ArrayError;
 use cage_rig::{Matrix3, Point, Polygons, Rows, SkinWeights, Transform};
 use numpy::ndarray::ArrayViewMutD;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
+    PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -36,13 +36,12 @@ fn array<'py>(
     };
     let lengths_fit =
         || array.shape().iter().zip(shape).all(|(found, (_, wanted))| wanted.is_none_or(|w| w == *found));
-    let kind: char = array.dtype().getattr("kind")?.extract()?;
-    let native: bool = array.dtype().getattr("isnative")?.extract()?;
-    let size: usize = array.dtype().getattr("itemsize")?.extract()?;
+    let found = array.dtype();
     let type_fits = match types {
-        INTEGERS => matches!(kind, 'i' | 'u'),
-        _ => kind == 'f' && (size == 4 || size == 8),
+        INTEGERS => matches!(found.kind(), b'i' | b'u'),
+        _ => found.kind() == b'f' && matches!(found.itemsize(), 4 | 8),
     };
+    let native = found.is_native_byteorder() != Some(false);
     if array.ndim() != shape.len() || !lengths_fit() || !type_fits || !native {
         return Err(refuse(argument, types, shape, &array));
     }

@@ -129,6 +129,21 @@ impl CoupledRig {
         self.with(py, |rig| rig.play(&cage, &transforms, rest_joints.as_deref()))?.or_raise()
     }
 
+    /// Playback where bones are posed (#J, 4, 4). Whether anything of it was new.
+    fn play_posed(
+        &self,
+        py: Python<'_>,
+        cage: &Bound<'_, PyAny>,
+        bones: &Bones,
+        posed: &Bound<'_, PyAny>,
+    ) -> PyResult<bool> {
+        bones.check(self.joints)?;
+        let cage = self.cage(cage)?;
+        let posed = arrays::matrices(posed, "posed", Some(self.joints))?;
+        let bones = &bones.bones;
+        self.with(py, |rig| rig.play(&cage, &bones.transforms(&posed), Some(&bones.heads())))?.or_raise()
+    }
+
     /// Moves the visible skin at rest by offsets (#M, 3), or not at all (None).
     #[pyo3(signature = (offsets))]
     fn offset_rest_skin(&self, py: Python<'_>, offsets: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
