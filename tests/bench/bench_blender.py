@@ -23,6 +23,7 @@ from blend_fixtures.build import RigObjects, build_biped, build_character
 
 QUICK = "--quick" in sys.argv
 ROUNDS = 3 if QUICK else 40
+TURNS = 1 if QUICK else 3  # ours and Blender's, one after the other
 BONES = 24
 PEER = "Mesh Deform (precision 5) + Armature"
 
@@ -104,19 +105,26 @@ def frame_and_bind(vertices: int, cage: int) -> list[Row]:
     """A whole frame (frame_set to evaluated mesh) and the bind, against Blender's own on the same meshes."""
     empty()
     objects = animated(vertices, cage)
-    count = len(objects.skins[0].data.vertices)
-    start = time.perf_counter()
-    rig = bind(objects)
-    bound = (time.perf_counter() - start) * 1e3
-    bpy.context.scene.frame_set(30)
-    core_agrees(rig)
-    alone = coordinates_alone(rig)
-    (ours,) = least(play(), rounds=ROUNDS)
-    select([rig.cage], rig.cage)
-    bpy.ops.cage_rig.unbind()
-    bpy.context.scene.frame_set(1)
-    bound_peer = mesh_deform(objects.skins[0], objects.cage)
-    (peer,) = least(play(), rounds=ROUNDS)
+    skin = objects.skins[0]
+    count = len(skin.data.vertices)
+    best: dict[str, float] = {}
+
+    def keep_least(**found: float) -> None:
+        best.update({name: min(taken, best.get(name, taken)) for name, taken in found.items()})
+
+    for _ in range(TURNS):
+        start = time.perf_counter()
+        rig = bind(objects)
+        keep_least(bound=(time.perf_counter() - start) * 1e3)
+        bpy.context.scene.frame_set(30)
+        core_agrees(rig)
+        keep_least(alone=coordinates_alone(rig), ours=least(play(), rounds=ROUNDS)[0])
+        select([rig.cage], rig.cage)
+        bpy.ops.cage_rig.unbind()
+        bpy.context.scene.frame_set(1)
+        keep_least(bound_peer=mesh_deform(skin, objects.cage), peer=least(play(), rounds=ROUNDS)[0])
+        skin.modifiers.remove(skin.modifiers["Mesh Deform"])
+    ours, peer, alone, bound, bound_peer = (best[name] for name in ("ours", "peer", "alone", "bound", "bound_peer"))
     label = f"{count:,} vertices, cage of {cage}"
     return [
         Row(f"frame in Blender: {label}", "what playback waits for, all bones and the cage moving", ours, peer, PEER),
