@@ -29,10 +29,15 @@ FRAMES = (1, 9, 20)
 
 
 def library(rig: Rig, folder: Path) -> str:
-    """Save the character as a collection "Character" of its own file; returns the path."""
+    """Save the rig as a collection "Character" of its own file; returns the path."""
+    return library_of([*rig.skins, rig.armature, rig.cage, rig.posed, rig.refit], folder)
+
+
+def library_of(objects: list[bpy.types.Object], folder: Path) -> str:
+    """The same of any objects."""
     home = bpy.data.collections.new("Character")
     bpy.context.scene.collection.children.link(home)
-    for obj in (*rig.skins, rig.armature, rig.cage, rig.posed, rig.refit):
+    for obj in objects:
         for collection in obj.users_collection:
             collection.objects.unlink(obj)
         home.objects.link(obj)
@@ -238,13 +243,7 @@ def test_a_cage_bound_in_the_shot_to_an_overridden_character(bar: Rig, tmp_path:
     cage_points, faces = rest(bar.cage), [list(face.vertices) for face in bar.cage.data.polygons]
     select([bar.cage], bar.cage)
     bpy.ops.cage_rig.unbind()
-    home = bpy.data.collections.new("Character")
-    bpy.context.scene.collection.children.link(home)
-    for obj in (bar.skin, bar.armature):
-        bpy.context.scene.collection.objects.unlink(obj)
-        home.objects.link(obj)
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
+    path = library_of([bar.skin, bar.armature], tmp_path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     link(path).override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
     skin = next(obj for obj in bpy.data.objects if obj.library is None and obj.type == "MESH")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scene import Rig, bend, fat_key, native, select, shown, unwatched, update
 from test_damaged import artists, reopened, snapshot
-from test_linked import as_rig, library, link, override, rigs
+from test_linked import as_rig, library, library_of, link, override, rigs
 
 CURRENT = 2
 NAMES = ("Bar", "BarRig", "BarCage")
@@ -220,13 +220,7 @@ def test_a_cage_that_an_older_version_bound_here_to_a_linked_character_is_brough
     """The modifier is on a skin of the library and of this file: nothing has to be done elsewhere."""
     select([bar.cage], bar.cage)
     bpy.ops.cage_rig.unbind()
-    home = bpy.data.collections.new("Character")
-    bpy.context.scene.collection.children.link(home)
-    for obj in (bar.skin, bar.armature, bar.cage):
-        bpy.context.scene.collection.objects.unlink(obj)
-        home.objects.link(obj)
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
+    path = library_of([bar.skin, bar.armature, bar.cage], tmp_path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     link(path).override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
     skin, bones, linked = (
