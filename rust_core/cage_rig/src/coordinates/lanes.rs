@@ -67,15 +67,15 @@ struct Room<S: Lanes> {
     /// N and H of each edge.
     sides: Vec<[Three<S>; 2]>,
     weights: Vec<Double<S>>,
-    doubtful: Vec<Doubtful>,
+    doubtful: Vec<Doubtful<S>>,
 }
 
 /// A face that some lanes have not added up yet, its R in each lane (0: added up) and what it would add.
-struct Doubtful {
+struct Doubtful<S: Lanes> {
     patch: u32,
     face: u32,
-    rounding: [f64; MOST],
-    weights: [[f64; MOST]; 3],
+    rounding: Double<S>,
+    weights: Three<S>,
 }
 
 impl Kernel for Weigh<'_> {
@@ -223,8 +223,8 @@ fn see<S: Lanes>(
             room.doubtful.push(Doubtful {
                 patch: index as u32,
                 face: number as u32,
-                rounding: spread(s, doubt),
-                weights: weights.map(|weight| spread(s, weight)),
+                rounding: doubt,
+                weights,
             });
             weights = weights.map(|weight| s.select_f64s(exact, weight, zero));
         }
@@ -313,42 +313,48 @@ fn look_again<S: Lanes>(
     surface: &Surface,
     points: &[Point],
     touched: &mut [bool; MOST],
-    doubtful: &[Doubtful],
+    doubtful: &[Doubtful<S>],
     sums: &mut [Double<S>],
 ) {
-    let mut total = s.splat_f64s(0.0);
+    let (zero, hopeless) = (s.splat_f64s(0.0), s.splat_f64s(HOPELESS / surface.size));
+    let mut total = zero;
     for sum in sums.iter() {
         total = s.add_f64s(total, *sum);
     }
-    let mut total = spread(s, total);
-    let hopeless = HOPELESS / surface.size;
-    for (lane, total) in total.iter_mut().enumerate() {
-        let known = doubtful.iter().filter(|d| d.rounding[lane] > 0.0 && d.rounding[lane] <= hopeless);
-        *total += known.map(|d| d.weights[0][lane] + d.weights[1][lane] + d.weights[2][lane]).sum::<f64>();
+    for Doubtful { rounding, weights: [a, b, c], .. } in doubtful {
+        let all = s.add_f64s(s.add_f64s(*a, *b), *c);
+        total = s.add_f64s(total, s.select_f64s(between(s, *rounding, hopeless), all, zero));
     }
+    let inexact = s.mul_f64s(s.splat_f64s(INEXACT), s.max_f64s(total, s.neg_f64s(total)));
+    let limit = s.min_f64s(hopeless, inexact);
     for Doubtful { patch, face, rounding, weights } in doubtful {
         let patch = &surface.patches[*patch as usize];
         let face = &patch.faces[*face as usize];
-        let mut found = [[0.0; MOST]; 3];
-        for (lane, point) in points.iter().enumerate().filter(|(lane, _)| rounding[*lane] > 0.0) {
-            if rounding[lane] <= hopeless.min(INEXACT * total[lane].abs()) {
-                (0..3).for_each(|k| found[k][lane] = weights[k][lane]);
-            } else if !touched[lane] {
-                match patch.sight(face, surface.vertices, point, surface.touch) {
-                    Sight::Weights(weights) => (0..3).for_each(|k| found[k][lane] = weights[k]),
-                    Sight::Nothing => {}
-                    Sight::Touched => touched[lane] = true,
+        let exact = between(s, *rounding, limit);
+        let mut found = weights.map(|weight| s.select_f64s(exact, weight, zero));
+        let left = s.select_f64s(exact, zero, *rounding);
+        if s.first_true_m64s(s.less_than_f64s(zero, left)) < S::F64_LANES {
+            let (left, mut closer) = (spread(s, left), found.map(|weight| spread(s, weight)));
+            for (lane, point) in points.iter().enumerate() {
+                if left[lane] > 0.0 && !touched[lane] {
+                    match patch.sight(face, surface.vertices, point, surface.touch) {
+                        Sight::Weights(weights) => (0..3).for_each(|k| closer[k][lane] = weights[k]),
+                        Sight::Nothing => {}
+                        Sight::Touched => touched[lane] = true,
+                    }
                 }
             }
+            found = closer.map(|weight| load(s, &weight));
         }
-        for (corner, weights) in face.corners.iter().zip(&found) {
+        for (corner, weight) in face.corners.iter().zip(found) {
             let sum = &mut sums[patch.vertices[*corner as usize] as usize];
-            *sum = s.add_f64s(*sum, load(s, weights));
+            *sum = s.add_f64s(*sum, weight);
         }
     }
+    let inexact = spread(s, inexact);
     // Far outside the sum is so small that every face is doubtful.
     for (lane, point) in points.iter().enumerate() {
-        if !touched[lane] && INEXACT * total[lane].abs() < DOUBTFUL / surface.size {
+        if !touched[lane] && inexact[lane] < DOUBTFUL / surface.size {
             let (row, on_it) = surface.seen_closely(point);
             touched[lane] = on_it;
             for (sum, weight) in sums.iter_mut().zip(&row) {
@@ -358,6 +364,12 @@ fn look_again<S: Lanes>(
             }
         }
     }
+}
+
+/// Where 0 < `a` ≤ `most`.
+#[inline(always)]
+fn between<S: Lanes>(s: S, a: Double<S>, most: Double<S>) -> S::m64s {
+    s.and_m64s(s.less_than_f64s(s.splat_f64s(0.0), a), s.less_than_or_equal_f64s(a, most))
 }
 
 /// Sums of 1; all 0 where the mesh has no weight at all.
