@@ -45,6 +45,17 @@ def test_given_bending_nodes_are_kept_and_quads_stay_quads(tube):
     assert sizes.sum() == len(corners)
 
 
+def test_tightening_leaves_sections_at_their_nodes(square_tube):
+    """Also on a limb with a waist, where sections that slide out of it make the volume less."""
+    skin, faces = square_tube([(i / 3, 0.3 + 0.3 * np.sin(i / 5) ** 2) for i in range(31)])
+    nodes, bending = np.array([[0.5, 0, 0], [9.5, 0, 0]]), np.array([[3.5, 0, 0], [6.5, 0, 0]])
+    vertices, _, report = core.generate_cage(skin, faces, nodes, np.array([[0, 1]]), bending_nodes=bending)
+    for at, section in enumerate(report["sections"]):
+        if section["kind"] == "bending":
+            middle = vertices[report["vertex_sections"] == at].mean(axis=0)
+            assert abs((middle - section["point"]) @ section["direction"]) < section["radius"]
+
+
 def test_sections_come_without_a_cage(tube):
     sections = core.cage_sections(*tube, bending_nodes=[[5.0, 0, 0]])
     middle = sections[1]

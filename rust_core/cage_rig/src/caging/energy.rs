@@ -1,10 +1,12 @@
 //! What a growing cage wants: to keep its shape, its distance, good faces, and little volume.
 //!
 //! A Laplacian of the displacement from a rest shape, a logarithmic barrier in every gap (after
-//! Li et al., *Incremental Potential Contact*, 2020), a penalty on slivers and a pressure. The Newton
-//! step keeps the positive part of each term and is solved by conjugate gradients with 3 by 3 blocks.
+//! Li et al., *Incremental Potential Contact*, 2020), a penalty on slivers, springs that
+//! hold sections at their nodes, and a pressure. The Newton step keeps the positive part of each term
+//! and is solved by conjugate gradients with 3 by 3 blocks.
 
 use super::contacts::{Contact, Points};
+use super::tubes::Scaffold;
 use crate::points::{Matrix3, Point};
 use rayon::prelude::*;
 
@@ -15,6 +17,8 @@ pub(crate) struct Weights {
     pub(crate) shape: f64,
     /// Shape: against the displacement itself.
     pub(crate) anchor: f64,
+    /// Against sections that slide along their limbs.
+    pub(crate) slide: f64,
     /// Pressure from outside.
     pub(crate) volume: f64,
     /// Against triangles flatter than [`FLAT`].
@@ -43,6 +47,24 @@ pub(crate) struct Shape<'a> {
     pub(crate) mirror: Option<&'a [u32]>,
     /// Whether a vertex moves; empty: all do.
     pub(crate) moves: &'a [bool],
+    /// Sections that stay where they are along their limbs.
+    pub(crate) sections: &'a [Station],
+}
+
+/// A section's vertices, and where along its limb their middle is to be.
+#[derive(Debug, Clone)]
+pub(crate) struct Station {
+    pub(crate) vertices: Vec<usize>,
+    pub(crate) along: Point,
+    pub(crate) place: f64,
+}
+
+impl Station {
+    /// How far the middle is from its place.
+    fn off(&self, x: &[Point]) -> f64 {
+        let sum: f64 = self.vertices.iter().map(|v| self.along.dot(&x[*v])).sum();
+        sum / self.vertices.len() as f64 - self.place
+    }
 }
 
 impl Shape<'_> {
@@ -96,6 +118,9 @@ pub(crate) fn energy(shape: &Shape, points: &Points, contacts: &[Contact], w: &W
     for (p, rest) in x.iter().zip(shape.rest) {
         sum += 0.5 * w.anchor * (p - rest).norm_squared();
     }
+    for section in shape.sections {
+        sum += 0.5 * w.slide * section.off(x).powi(2);
+    }
     for t in shape.faces {
         let [a, b, c] = t.map(|v| &x[v as usize]);
         sum += w.volume * a.dot(&b.cross(c)) / 6.0;
@@ -134,6 +159,17 @@ pub(crate) fn newton_step(shape: &Shape, points: &Points, contacts: &[Contact], 
         system.gradient[i] += (p - rest) * w.anchor;
         system.add(i, i, &(Matrix3::identity() * (w.anchor + 1e-9)));
     }
+    for section in shape.sections.iter().filter(|_| w.slide > 0.0) {
+        let part = 1.0 / section.vertices.len() as f64;
+        let block = section.along * section.along.transpose() * (w.slide * part * part);
+        let pull = section.along * (w.slide * section.off(x) * part);
+        for &i in &section.vertices {
+            system.gradient[i] += pull;
+            for &j in &section.vertices {
+                system.add(i, j, &block);
+            }
+        }
+    }
     for t in shape.faces {
         let corners = t.map(|v| &x[v as usize]);
         for k in 0..3 {
@@ -170,6 +206,30 @@ pub(crate) fn newton_step(shape: &Shape, points: &Points, contacts: &[Contact], 
     let mut step = system.solve(shape);
     shape.project(&mut step);
     step
+}
+
+/// Where the sections that close nothing are along their limbs, with these corners.
+pub(crate) fn stations(scaffold: &Scaffold, corners: &[Point]) -> Vec<Station> {
+    let count = scaffold.owner.last().map_or(0, |last| last + 1);
+    let mut vertices = vec![Vec::new(); count];
+    for (v, node) in scaffold.owner.iter().enumerate() {
+        vertices[*node].push(v);
+    }
+    for polygon in &scaffold.polygons {
+        let node = scaffold.owner[polygon[0] as usize];
+        if polygon.iter().all(|v| scaffold.owner[*v as usize] == node) {
+            vertices[node].clear();
+        }
+    }
+    let station = |vertices: Vec<usize>| {
+        let n = vertices.len();
+        let corner = |k: usize| corners[vertices[k % n]];
+        let middle = (0..n).map(corner).sum::<Point>() / n as f64;
+        let around = (0..n).map(|k| (corner(k) - middle).cross(&(corner(k + 1) - middle))).sum::<Point>();
+        let along = around.try_normalize(1e-12)?;
+        Some(Station { vertices, along, place: along.dot(&middle) })
+    };
+    vertices.into_iter().filter(|vertices| !vertices.is_empty()).filter_map(station).collect()
 }
 
 /// The symmetric part of a field of vectors.
@@ -284,6 +344,30 @@ mod tests {
                     assert!((found - gradient[k][axis]).abs() < 1e-4 * (1.0 + gradient[k].norm()));
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_section_is_drawn_back_along_its_limb_and_no_further() {
+        let ring = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+        let cage: Vec<Point> = ring.map(|(y, z)| Point::new(0.1 * y, y, z)).to_vec();
+        let along = Point::x();
+        let sections = [Station { vertices: vec![0, 1, 2, 3], along, place: 0.5 }];
+        let shape =
+            Shape { faces: &[], edges: &[], rest: &cage, mirror: None, moves: &[], sections: &sections };
+        let w = Weights {
+            shape: 0.0,
+            anchor: 0.0,
+            slide: 1.0,
+            volume: 0.0,
+            quality: 0.0,
+            reach: 1.0,
+            least: 0.0,
+        };
+        let points = Points { cage: &cage, obstacle: &[] };
+        assert!((energy(&shape, &points, &[], &w) - 0.125).abs() < 1e-12);
+        for step in newton_step(&shape, &points, &[], &w) {
+            assert!((step - along * 0.5).norm() < 1e-6, "{step}");
         }
     }
 

@@ -1,8 +1,9 @@
 //! The last stages of a cage: drawn tight, checked exactly, and handed out with its faces.
 
 use super::inflation::Inflation;
-use super::obstacle::StandIn;
+use super::obstacle::Obstacles;
 use super::report::{self, Laps};
+use super::tightening::{DRAWN, SETTLED};
 use super::{tubes, verify, GeneratedCage, Generator, Plan};
 use crate::error::CagingError;
 use crate::geometry::bvh::Bvh;
@@ -16,18 +17,22 @@ impl Generator {
     pub(super) fn finish(
         &self,
         mut inflation: Inflation,
-        obstacle: &StandIn,
+        obstacles: &Obstacles,
         plan: &Plan,
         held: &[Option<Point>],
         (mut clock, part): (Clock, &Part),
     ) -> Result<GeneratedCage, CagingError> {
-        let [tightening, opening, checking] = part.split([2.4, 0.6, 0.3]);
+        let [drawing, settling, opening, checking] = part.split([1.6, 0.8, 0.6, 0.3]);
         let options = &self.options.inflation;
-        tightening.begin("tightening the cage")?;
+        let Obstacles { growth, tightening: fine } = obstacles;
+        // An edited cage is closer to the skin than the stand-in of growth allows.
+        let drawn_around = if held.is_empty() { growth } else { fine };
+        drawing.begin("tightening the cage")?;
         let mut cages = vec![inflation.cage.clone()];
-        inflation.tighten(obstacle, options, &tightening)?;
+        inflation.tighten(drawn_around, &DRAWN, options, &drawing)?;
+        inflation.tighten(fine, &SETTLED, options, &settling)?;
         cages.push(inflation.cage.clone());
-        if inflation.open_slivers(obstacle, options, &opening)? {
+        if inflation.open_slivers(fine, options, &opening)? {
             cages.push(inflation.cage);
         }
         clock.lap("tightening");

@@ -2,14 +2,14 @@
 //!
 //! In the spirit of nested cages [SVJ15], with the means of [IPC]: skin and cage move together, as far
 //! as additive continuous collision detection lets every gap stay open; then the cage relaxes by
-//! Newton steps under a barrier. At the end pressure draws it tight around the resting skin. Cost:
+//! Newton steps under a barrier. What presses it on the resting skin afterwards is in `tightening`. Cost:
 //! about a hundred steps, each linear in the gaps narrower than a few per cent of the size.
 
 use super::contacts::{contacts, narrower, Body, Contact, Points};
 use super::contraction::Start;
-use super::energy::{energy, newton_step, Shape, Weights};
+use super::energy::{energy, newton_step, stations, Shape, Station, Weights};
 use super::obstacle::{Mesh, StandIn};
-use super::report::{least_angle, volume};
+use super::report::least_angle;
 use super::tubes::Scaffold;
 use crate::geometry::collision::free_part;
 use crate::points::Point;
@@ -25,18 +25,18 @@ pub struct InflationOptions {
     pub clearance: f64,
     /// Strength of the final pressure; 0 leaves the cage as it grew.
     pub tightness: f64,
-    /// Newton steps of the final tightening; more, while the volume falls.
+    /// Rounds of the final tightening; more, while the volume falls.
     pub rounds: usize,
 }
 
 impl Default for InflationOptions {
     fn default() -> Self {
-        Self { reach: 4e-3, clearance: 3e-4, tightness: 1.0, rounds: 40 }
+        Self { reach: 4e-3, clearance: 3e-4, tightness: 1.0, rounds: 150 }
     }
 }
 
 /// The farthest anything moves in one step.
-const STEP: f64 = 3e-3;
+pub(super) const STEP: f64 = 3e-3;
 
 /// Gaps narrower than this part of the reach make the skin wait, so many times in a row.
 const PRESSED: f64 = 0.02;
@@ -49,26 +49,21 @@ const APPROACH: usize = 60;
 const STRAIGHTEN: usize = 100;
 const STRAIGHT: f64 = 1e-3;
 
-/// A cage is tightened so many times longer while its volume falls below this part in so many rounds.
-const MORE: usize = 5;
-const FALLING: f64 = 0.995;
-const CHECKED: usize = 8;
-
 /// Weight against flat triangles while the cage is tightened.
-const QUALITY: f64 = 1e-4;
-/// A face with a smaller angle (degrees) is a sliver, and so often the weight against flat triangles
-/// is raised to widen it.
-const SLIVER: f64 = 7.0;
-const HARDER: i32 = 5;
+pub(super) const QUALITY: f64 = 1e-4;
+/// Weight against sections that slide along their limbs.
+const SLIDE: f64 = 0.1;
 
 /// A cage in the middle of its growth.
 pub(crate) struct Inflation<'a> {
     scaffold: &'a Scaffold,
-    faces: Vec<[u32; 3]>,
+    pub(super) faces: Vec<[u32; 3]>,
     edges: Vec<(u32, u32)>,
     mirror: Option<&'a [u32]>,
     /// Whether a vertex moves; empty: all do.
     moves: Vec<bool>,
+    /// Where along their limbs sections are to stay.
+    sections: Vec<Station>,
     pub(crate) cage: Vec<Point>,
     body: Body,
 }
@@ -88,7 +83,16 @@ impl<'a> Inflation<'a> {
         edges.sort_unstable();
         edges.dedup();
         let body = Body::new(&cage, &faces);
-        Self { scaffold, faces, edges, mirror, moves: Vec::new(), cage, body }
+        Self {
+            scaffold,
+            faces,
+            edges,
+            mirror,
+            moves: Vec::new(),
+            sections: stations(scaffold, &scaffold.corners),
+            cage,
+            body,
+        }
     }
 
     /// Only these vertices move from now on.
@@ -115,6 +119,7 @@ impl<'a> Inflation<'a> {
         let mut weights = Weights {
             shape: 1.0,
             anchor: 0.02,
+            slide: 0.0,
             volume: 0.0,
             quality: 2e-5,
             reach: options.reach,
@@ -205,11 +210,13 @@ impl<'a> Inflation<'a> {
         options: &InflationOptions,
         progress: &Part,
     ) -> Result<(), Cancelled> {
+        self.sections = stations(self.scaffold, goal);
         let mut resting = Resting::new(obstacle, options);
         for round in 0..APPROACH {
             progress.reach(round as f64 / APPROACH as f64)?;
             let weights = Weights {
                 volume: 0.0,
+                slide: 0.0,
                 anchor: 0.02,
                 ..resting.weights(options, (options.reach, 1.0, QUALITY))
             };
@@ -243,72 +250,16 @@ impl<'a> Inflation<'a> {
             if farthest < STRAIGHT {
                 break;
             }
-            let weights = Weights { volume: 0.0, ..resting.weights(options, (options.reach, 1.0, QUALITY)) };
+            let weights = resting.weights(options, (options.reach, 1.0, QUALITY));
+            let weights = Weights { volume: 0.0, slide: 0.0, ..weights };
             self.press(&mut resting, Some(&goal), weights, STEP);
         }
         Ok(())
     }
 
-    /// Tightens the cage around a resting obstacle, to a gap of the clearance and the obstacle's margin.
-    pub(crate) fn tighten(
-        &mut self,
-        obstacle: &StandIn,
-        options: &InflationOptions,
-        progress: &Part,
-    ) -> Result<(), Cancelled> {
-        let mut resting = Resting::new(obstacle, options);
-        let mut reach = options.reach;
-        let (mut stiffness, mut limit) = (0.3, STEP);
-        let mut last = f64::INFINITY;
-        for round in 0..MORE * options.rounds {
-            progress.reach(round as f64 / options.rounds as f64)?;
-            if round % CHECKED == 0 {
-                let now = volume(&self.cage, &self.faces);
-                if round >= options.rounds && now > FALLING * last {
-                    break;
-                }
-                last = now;
-            }
-            let weights = resting.weights(options, (reach, stiffness, QUALITY));
-            let moved = self.press(&mut resting, None, weights, limit);
-            limit = (3.0 * moved).clamp(0.1 * STEP, STEP);
-            if round % 8 == 7 {
-                reach = (0.6 * reach).max(4.0 * options.clearance);
-                stiffness = (0.5 * stiffness).max(0.05);
-            }
-            if moved < 2e-5 && reach <= 4.1 * options.clearance {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Widens slivers of a tightened cage, pressing harder and harder against them. True when there
-    /// were some.
-    pub(crate) fn open_slivers(
-        &mut self,
-        obstacle: &StandIn,
-        options: &InflationOptions,
-        progress: &Part,
-    ) -> Result<bool, Cancelled> {
-        let mut resting = Resting::new(obstacle, options);
-        for harder in 1..=HARDER {
-            if self.least_angle() >= SLIVER {
-                return Ok(harder > 1);
-            }
-            progress.reach(f64::from(harder - 1) / f64::from(HARDER))?;
-            let shape = (4.0 * options.clearance, 0.05, QUALITY * 6.0_f64.powi(harder));
-            for _ in 0..6 {
-                let weights = resting.weights(options, shape);
-                self.press(&mut resting, None, weights, STEP);
-            }
-        }
-        Ok(true)
-    }
-
     /// One round around a resting obstacle, from where it is or toward a goal: no longer than `limit`.
     /// How far anything moved.
-    fn press(
+    pub(super) fn press(
         &mut self,
         resting: &mut Resting,
         goal: Option<&[Point]>,
@@ -343,8 +294,10 @@ impl<'a> Inflation<'a> {
         (rounds, limit): (usize, f64),
     ) -> f64 {
         let edges = std::mem::take(&mut self.edges);
+        let sections = std::mem::take(&mut self.sections);
         let (mirror, moves) = (self.mirror, &self.moves);
-        let shape = Shape { faces: &self.faces, edges: &edges, rest: goal, mirror, moves };
+        let shape =
+            Shape { faces: &self.faces, edges: &edges, rest: goal, mirror, moves, sections: &sections };
         let mut left = limit;
         for _ in 0..rounds {
             let points = Points { cage: &self.cage, obstacle };
@@ -376,12 +329,13 @@ impl<'a> Inflation<'a> {
             }
         }
         self.edges = edges;
+        self.sections = sections;
         limit - left
     }
 }
 
 /// An obstacle that stays where it is while the cage is tightened around it.
-struct Resting<'a> {
+pub(super) struct Resting<'a> {
     points: &'a [Point],
     body: Body,
     /// Wanted in every gap.
@@ -391,15 +345,19 @@ struct Resting<'a> {
 }
 
 impl<'a> Resting<'a> {
-    fn new(obstacle: &'a StandIn, options: &InflationOptions) -> Self {
+    pub(super) fn new(obstacle: &'a StandIn, options: &InflationOptions) -> Self {
         let Mesh { points, triangles } = &obstacle.mesh;
         let body = Body::new(points, triangles);
         Self { points, body, clearance: options.clearance + obstacle.margin, least: 0.0 }
     }
 
-    fn weights(&self, options: &InflationOptions, (reach, shape, quality): (f64, f64, f64)) -> Weights {
+    pub(super) fn weights(
+        &self,
+        options: &InflationOptions,
+        (reach, shape, quality): (f64, f64, f64),
+    ) -> Weights {
         let (volume, least) = (options.tightness, self.least);
-        Weights { shape, anchor: 1e-3, volume, quality, reach, least }
+        Weights { shape, anchor: 1e-3, slide: SLIDE, volume, quality, reach, least }
     }
 }
 

@@ -25,6 +25,7 @@ mod sections;
 pub(crate) mod skeleton;
 mod skin;
 mod symmetry;
+mod tightening;
 mod tips;
 mod transplant;
 mod tubes;
@@ -277,7 +278,8 @@ impl Generator {
         let (nodes, sections, mirror) = self.cross_sections(skeleton, bending, &tracing)?;
         clock.lap("sections");
         starting.begin("a start inside the skin")?;
-        let Obstacles { growth, tightening: fine } = self.obstacles.get_or_init(|| Obstacles::of(&self.skin));
+        let obstacles = self.obstacles.get_or_init(|| Obstacles::of(&self.skin));
+        let growth = &obstacles.growth;
         clock.lap("obstacle");
         let (scaffold, start) = self.start(skeleton, (&nodes, &sections), &growth.mesh, &starting)?;
         clock.lap("contraction");
@@ -292,7 +294,7 @@ impl Generator {
             return Err(CagingError::Stuck { node, place }.into());
         }
         clock.lap("growth");
-        Ok(self.finish(inflation, fine, &plan, &[], (clock, &finishing))?)
+        Ok(self.finish(inflation, obstacles, &plan, &[], (clock, &finishing))?)
     }
 
     /// The faces, and a start free of crossings: the largest rings that have one.

@@ -76,7 +76,8 @@ impl Generator {
         };
         let mirror = if symmetric { mirrored(&faces.start) } else { None };
         let moves = touched(&joined, &faces.scaffold, &lineage, mirror.as_deref());
-        let fine = &self.obstacles.get_or_init(|| Obstacles::of(&self.skin)).tightening;
+        let obstacles = self.obstacles.get_or_init(|| Obstacles::of(&self.skin));
+        let fine = &obstacles.tightening;
         let Some(start) = start(&faces, &moves, mirror.as_deref(), &fine.mesh) else { return Ok(None) };
         clock.lap("start");
         let Transplanted { scaffold, origin, goal, .. } = faces;
@@ -86,7 +87,7 @@ impl Generator {
         let mut inflation = Inflation::new(&plan.scaffold, plan.mirror.as_deref(), start).hold(moves);
         inflation.approach(&goal, fine, &self.options.inflation, &starting)?;
         clock.lap("approach");
-        let found = self.finish(inflation, fine, &plan, &held, (clock, &finishing));
+        let found = self.finish(inflation, obstacles, &plan, &held, (clock, &finishing));
         Ok(unless_cancelled(found)?.filter(|cage| cage.report.min_angle >= NARROW))
     }
 
