@@ -79,19 +79,22 @@ impl Generator {
         let tree = Bvh::new(&self.skin.original, &self.skin.triangles);
         let clear = 0.5 * self.options.inflation.clearance * self.skin.space.size;
         let mut faces = Polygons::default();
+        // Quads that are kept may be split either way, all at once.
+        let mut possible = triangles.clone();
         for polygon in &scaffold.polygons {
             let pieces = tubes::split(&scaffold.corners, polygon);
             let whole = pieces.len() == 2
                 && verify::splits_either_way(
                     &pieces,
                     vertices,
-                    &triangles,
+                    &possible,
                     (&self.skin.original, &self.skin.triangles),
                     (&tree, clear),
                 );
             if whole {
                 // Starts where a fan gives the verified triangles.
                 let [a, b, c] = pieces[0];
+                possible.extend([[b, c, pieces[1][2]], [b, pieces[1][2], a]]);
                 faces.corners.extend([a, b, c, pieces[1][2]].map(i64::from));
                 faces.sizes.push(4);
             } else {
