@@ -22,7 +22,7 @@ from tube import tube
 from blend_fixtures.build import RigObjects, build_biped, build_character
 
 QUICK = "--quick" in sys.argv
-ROUNDS = 3 if QUICK else 40
+ROUNDS = 3 if QUICK else 150
 TURNS = 1 if QUICK else 3  # ours and Blender's, one after the other
 BONES = 24
 PEER = "Mesh Deform (precision 5) + Armature"
