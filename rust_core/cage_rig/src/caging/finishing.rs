@@ -25,11 +25,12 @@ impl Generator {
         let [drawing, settling, opening, checking] = part.split([1.6, 0.8, 0.6, 0.3]);
         let options = &self.options.inflation;
         let Obstacles { growth, tightening: fine } = obstacles;
-        // An edited cage is closer to the skin than the stand-in of growth allows.
-        let drawn_around = if held.is_empty() { growth } else { fine };
         drawing.begin("tightening the cage")?;
         let mut cages = vec![inflation.cage.clone()];
-        inflation.tighten(drawn_around, &DRAWN, options, &drawing)?;
+        // An edited cage is closer to the skin than the stand-in of growth allows, and needs less.
+        if held.is_empty() {
+            inflation.tighten(growth, &DRAWN, options, &drawing)?;
+        }
         inflation.tighten(fine, &SETTLED, options, &settling)?;
         cages.push(inflation.cage.clone());
         if inflation.open_slivers(fine, options, &opening)? {
