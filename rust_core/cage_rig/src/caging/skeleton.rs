@@ -169,7 +169,8 @@ pub(crate) fn curve_skeleton(
         }
         let changed = prune(skin, &mut graph, &skeleton, (detail, without))
             || drop_crown(skin, &mut graph, &skeleton)
-            || merge(&mut graph, &skeleton);
+            || merge(&mut graph, &skeleton)
+            || unfold(skin, &mut graph);
         if !changed {
             lead_on(skin, &mut skeleton);
             return Ok(skeleton);

@@ -12,8 +12,9 @@ use crate::points::Point;
 /// Where a tip is as thin as this part of its arc, it ends.
 pub(super) const THIN: f64 = 0.3;
 
-/// Drops ends that lie on the bone they hang from, or within half the radius of it.
-pub(super) fn unfold(skin: &Skin, graph: &mut Graph) {
+/// Drops ends that lie on the bone they hang from, or within half the radius of it. Whether there were any.
+pub(super) fn unfold(skin: &Skin, graph: &mut Graph) -> bool {
+    let before = graph.edges.len();
     loop {
         let around = |i: usize| {
             graph.edges.iter().filter_map(move |&(a, b)| match (a == i, b == i) {
@@ -33,7 +34,7 @@ pub(super) fn unfold(skin: &Skin, graph: &mut Graph) {
             let apart = (p + way * t - x).norm();
             (t > 0.0 && apart < 0.5 * skin.depth(&x)).then_some((tip, base))
         });
-        let Some((tip, base)) = folded else { return };
+        let Some((tip, base)) = folded else { return graph.edges.len() < before };
         graph.edges.retain(|e| *e != (tip.min(base), tip.max(base)));
         graph.dropped.push(graph.node[tip]);
     }
@@ -112,5 +113,17 @@ mod tests {
         let found = curve_skeleton(&skin, &bones, &[[0, 1], [1, 2], [2, 3]], 0.0, &[]).expect("inside");
         assert_eq!(found.dropped, [3]);
         assert_eq!(found.arcs.len(), 1);
+    }
+
+    #[test]
+    fn a_bone_that_folds_back_once_what_hangs_from_it_is_pruned_is_dropped() {
+        let skin = bar();
+        let mut bones = [9.0, 6.0, 3.0, 5.0].map(|x| Point::new(x, 0.0, 0.0)).to_vec();
+        bones.extend([0.3, -0.3].map(|y| Point::new(4.4, y, 0.0)));
+        let edges = [[0, 1], [1, 2], [2, 3], [3, 4], [3, 5]];
+        let found = curve_skeleton(&skin, &bones, &edges, 0.0, &[]).expect("inside");
+        assert_eq!(found.arcs.len(), 1);
+        let named: Vec<usize> = found.arcs[0].nodes.iter().flatten().copied().collect();
+        assert!(named == [0, 1, 2] || named == [2, 1, 0], "{named:?}");
     }
 }
