@@ -17,11 +17,7 @@ from blend_fixtures import rigs, uncaged
 
 QUICK = ("human_2k_53b", "fox_576_24b", "proc_airplane", "spot_unrigged")
 LARGE_ASKED = "CAGE_RIG_LARGE_CHARACTERS"
-SHAPES = [make.__name__ for make in caged.FIXTURES if make.__name__ not in ("biped", "octopus")]
-KNOWN = {  # expected failures, by name or by name and placement
-    ("spot_unrigged", "JOINTS"): "with joints at every node of the skeleton found, its sections cross at the start",
-    "biped": "between legs that almost touch, a face of the cage is narrower than 5 degrees",
-}
+SHAPES = [make.__name__ for make in caged.FIXTURES]
 PLACEMENTS = pytest.mark.parametrize("placement", ["AUTOMATIC", "JOINTS"])
 
 
@@ -30,16 +26,6 @@ def caging(installed: None) -> ModuleType:
     import bl_ext.user_default.cage_rig.caging as caging
 
     return caging
-
-
-@pytest.fixture(autouse=True)
-def known(request: pytest.FixtureRequest) -> None:
-    """Faults of the generator that are known are expected failures."""
-    given = request.node.callspec.params if hasattr(request.node, "callspec") else {}
-    name = given.get("name", "")
-    reason = KNOWN.get(name) or KNOWN.get((name, given.get("placement", "AUTOMATIC")))
-    if reason:
-        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
 
 
 def shared() -> list[object]:
@@ -72,11 +58,6 @@ def test_a_fixture_is_caged(caging: ModuleType, name: str, placement: str) -> No
 @pytest.mark.parametrize("name", rigs.RIGS)
 def test_a_kind_of_rig_is_caged(caging: ModuleType, name: str) -> None:
     check(caging, caged.rigged(name)(), "JOINTS")
-
-
-@pytest.mark.parametrize("name", ["biped", "octopus"])
-def test_a_character_of_the_project_is_caged(caging: ModuleType, name: str) -> None:
-    check(caging, caged.every_fixture()[name](), "AUTOMATIC")
 
 
 @PLACEMENTS

@@ -29,6 +29,7 @@ mod tightening;
 mod tips;
 mod transplant;
 mod tubes;
+mod turning;
 mod verify;
 
 pub use control_nodes::{NodeKind, Placement};
@@ -178,7 +179,7 @@ impl Generator {
         bending: Option<&[Point]>,
         part: &Part,
     ) -> Result<Vec<SectionReport>, CagingError> {
-        let (nodes, sections, _) = self.cross_sections(&self.skeleton, bending, part)?;
+        let (nodes, sections, _) = self.cross_sections(&self.skeleton, bending, &[], part)?;
         Ok(report::sections(&self.skin, &nodes, &sections))
     }
 
@@ -196,6 +197,7 @@ impl Generator {
         &self,
         skeleton: &CurveSkeleton,
         bending: Option<&[Point]>,
+        turned: &[usize],
         part: &Part,
     ) -> Result<CrossSections, CagingError> {
         let mut nodes = control_nodes(&self.skin, skeleton, bending, self.options.placement)?;
@@ -206,6 +208,7 @@ impl Generator {
         let options = &self.options.sections;
         let mut found =
             self.traced.sections(&self.skin, skeleton, &nodes, (options, partners.as_deref()), part)?;
+        turned.iter().for_each(|at| found[*at] = found[*at].turned());
         let mirror = partners.and_then(|partners| symmetry::symmetrise(&nodes, &mut found, &partners));
         Ok((nodes, found, mirror))
     }
@@ -254,8 +257,8 @@ impl Generator {
     ) -> Result<GeneratedCage, CagingError> {
         let mut without = Vec::new();
         loop {
-            let (junction, fault) = match self.attempt(&skeleton, bending, part) {
-                Ok(found) => return Ok(found),
+            let (junction, fault) = match self.attempt(&skeleton, bending, &[], part) {
+                Ok(found) => return self.widened(found, &skeleton, bending, part),
                 Err(Failure::Other(fault)) => return Err(fault),
                 Err(Failure::Junction(junction, fault)) => (junction, fault),
             };
@@ -266,16 +269,37 @@ impl Generator {
         }
     }
 
+    /// A cage with narrow faces is grown again with the sections there turned; the better one.
+    fn widened(
+        &self,
+        found: GeneratedCage,
+        skeleton: &CurveSkeleton,
+        bending: Option<&[Point]>,
+        part: &Part,
+    ) -> Result<GeneratedCage, CagingError> {
+        let turned = turning::narrow(&found);
+        if turned.is_empty() {
+            return Ok(found);
+        }
+        match self.attempt(skeleton, bending, &turned, part) {
+            Err(Failure::Other(CagingError::Cancelled(cancelled))) => Err(cancelled.into()),
+            Ok(other) if other.report.min_angle > found.report.min_angle => Ok(other),
+            _ => Ok(found),
+        }
+    }
+
+    /// `turned`: sections that have their corners elsewhere on their rings.
     fn attempt(
         &self,
         skeleton: &CurveSkeleton,
         bending: Option<&[Point]>,
+        turned: &[usize],
         part: &Part,
     ) -> Result<GeneratedCage, Failure> {
         let mut clock = Clock::new();
         let [tracing, starting, growing, finishing] = part.split([1.0, 0.5, 4.0, 3.3]);
         tracing.begin("cross sections")?;
-        let (nodes, sections, mirror) = self.cross_sections(skeleton, bending, &tracing)?;
+        let (nodes, sections, mirror) = self.cross_sections(skeleton, bending, turned, &tracing)?;
         clock.lap("sections");
         starting.begin("a start inside the skin")?;
         let obstacles = self.obstacles.get_or_init(|| Obstacles::of(&self.skin));

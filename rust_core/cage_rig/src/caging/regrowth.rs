@@ -52,9 +52,9 @@ impl Generator {
         let mut clock = Clock::new();
         let [first, tracing, starting, finishing] = part.split([1.0, 1.0, 1.5, 2.0]);
         tracing.begin("cross sections")?;
-        let before = self.cross_sections(&self.skeleton, earlier.bending.as_deref(), &first);
+        let before = self.cross_sections(&self.skeleton, earlier.bending.as_deref(), &[], &first);
         let Some((before, _, _)) = unless_cancelled(before)? else { return Ok(None) };
-        let (nodes, sections, mirror) = self.cross_sections(&self.skeleton, bending, &tracing)?;
+        let (nodes, sections, mirror) = self.cross_sections(&self.skeleton, bending, &[], &tracing)?;
         clock.lap("sections");
         starting.begin("what the edit leaves alone")?;
         let count = sections.first().map_or(0, |s| s.corners.len());
