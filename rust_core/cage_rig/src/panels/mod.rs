@@ -1,11 +1,12 @@
 //! A matrix laid out for products with points: Φ and Λ as frames read them.
 //!
 //! Rows lie in panels of 32, a panel column by column: one product is one walk through memory, with the
-//! sums of a panel in registers. Products are steps from known points: only columns that move are
-//! read, and no movement is exact. Cost: three multiply-adds a number read, by far the largest product of
-//! a frame; large ones are as fast as memory, small ones as the multipliers. Bakes, which know their
-//! frames in advance, make four of them of one walk.
+//! sums of a panel in registers, and what they are added to lies as they do ([`Apart`]). Products are
+//! steps from known points: only columns that move are read, and no movement is exact. Cost: three
+//! multiply-adds a number read, by far the largest product of a frame; large ones are as fast as memory,
+//! small ones as the multipliers. Bakes, which know their frames in advance, make four of them of one walk.
 
+mod apart;
 mod strips;
 #[cfg(test)]
 mod tests;
@@ -13,6 +14,7 @@ mod tests;
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use crate::simd::{Kernel, Lanes, Path};
+pub(crate) use apart::Apart;
 use rayon::prelude::*;
 use strips::{halves, pack_half, pack_single, singles, Half, Single, Strips};
 
@@ -61,7 +63,7 @@ pub(crate) struct Product<'a> {
     /// The instructions to use.
     pub(crate) path: Path,
     /// `#rows by 3`.
-    pub(crate) from: &'a [[f32; 3]],
+    pub(crate) from: &'a Apart,
     /// `#rows`; none: 1.
     pub(crate) mask: Option<&'a [f32]>,
     /// `#rows by 3`, added at the end.
@@ -173,90 +175,89 @@ impl<const F: usize> Write<'_, F> {
     fn of<L: Lanes, S: Strips>(self, lanes: L, panel: impl Fn(usize) -> S) {
         let Self { product, first, steps, mut out, .. } = self;
         for (p, start) in (0..out[0].len()).step_by(PANEL).enumerate() {
-            let strips = panel(p);
+            let (strips, row) = (panel(p), first + start);
+            let count = PANEL.min(out[0].len() - start);
+            let from = product.from.panel(row / PANEL);
+            let mut padded = [0.0; PANEL];
+            let mask = product.mask.map(|mask| match &mask[row..row + count] {
+                mask if count == PANEL => mask,
+                mask => {
+                    padded[..count].copy_from_slice(mask);
+                    &padded
+                }
+            });
             for (f, out) in out.iter_mut().enumerate() {
                 // After the first frame the panel is in the first cache.
-                let mut sums = [[0.0f32; PANEL]; 3];
-                // As many sums at once as there are registers for.
-                match L::F32_LANES {
-                    16 => sum::<L, S, 2, F>(lanes, strips, steps, f, &mut sums),
-                    _ => sum::<L, S, 4, F>(lanes, strips, steps, f, &mut sums),
+                let moves = Moves { strips, steps, f, from, mask };
+                let out = &mut out[start..start + count];
+                if count == PANEL {
+                    moves.rows(lanes, out);
+                } else {
+                    let mut last = [[0.0; 3]; PANEL];
+                    moves.rows(lanes, &mut last);
+                    out.copy_from_slice(&last[..count]);
                 }
-                let count = PANEL.min(out.len() - start);
-                finish(lanes, product, first + start, &mut sums, &mut out[start..start + count]);
+                if let Some(offsets) = product.offsets {
+                    for (x, offset) in out.as_flattened_mut().iter_mut().zip(offsets[row..].as_flattened()) {
+                        *x += offset;
+                    }
+                }
             }
         }
     }
 }
 
-/// Sums of a panel in frame `f`, `V` vectors of rows at a time.
-#[inline(always)]
-fn sum<L: Lanes, S: Strips, const V: usize, const F: usize>(
-    lanes: L,
+/// What rows of a panel are made of in frame `f`.
+struct Moves<'a, S, const F: usize> {
     strips: S,
-    steps: &[Step<F>],
+    steps: &'a [Step<F>],
     f: usize,
-    sums: &mut [[f32; PANEL]; 3],
-) {
-    for at in (0..PANEL).step_by(V * L::F32_LANES) {
-        let zero = [lanes.splat_f32s(0.0); V];
-        let (mut x, mut y, mut z) = (zero, zero, zero);
-        for step in steps {
-            let (strip, [dx, dy, dz]) = (strips.strip(step.column), step.by[f]);
-            let dx = lanes.splat_f32s(S::scaled(&strip, dx));
-            let dy = lanes.splat_f32s(S::scaled(&strip, dy));
-            let dz = lanes.splat_f32s(S::scaled(&strip, dz));
-            for v in 0..V {
-                let numbers = S::load(lanes, &strip, at + v * L::F32_LANES);
-                x[v] = lanes.fused(numbers, dx, x[v]);
-                y[v] = lanes.fused(numbers, dy, y[v]);
-                z[v] = lanes.fused(numbers, dz, z[v]);
-            }
-        }
-        for v in 0..V {
-            let row = at + v * L::F32_LANES;
-            lanes.store(&mut sums[0][row..], x[v]);
-            lanes.store(&mut sums[1][row..], y[v]);
-            lanes.store(&mut sums[2][row..], z[v]);
-        }
-    }
+    from: &'a [Single; 3],
+    mask: Option<&'a [f32]>,
 }
 
-/// Adds the sums of a panel to what they move.
-#[inline(always)]
-fn finish<L: Lanes>(
-    lanes: L,
-    product: &Product,
-    start: usize,
-    sums: &mut [[f32; PANEL]; 3],
-    out: &mut [[f32; 3]],
-) {
-    let count = out.len();
-    let from = &product.from[start..][..count];
-    if let Some(mask) = product.mask {
-        for sums in sums.iter_mut() {
-            for (sum, part) in sums.iter_mut().zip(&mask[start..][..count]) {
-                *sum *= part;
+impl<S: Strips, const F: usize> Moves<'_, S, F> {
+    #[inline(always)]
+    fn rows<L: Lanes>(&self, lanes: L, out: &mut [[f32; 3]]) {
+        // As many sums at once as there are registers for.
+        match L::F32_LANES {
+            16 => self.vectors::<L, 2>(lanes, out.as_flattened_mut()),
+            _ => self.vectors::<L, 4>(lanes, out.as_flattened_mut()),
+        }
+    }
+
+    /// `V` vectors of rows at a time.
+    #[inline(always)]
+    fn vectors<L: Lanes, const V: usize>(&self, lanes: L, out: &mut [f32]) {
+        let Self { strips, steps, f, from, mask } = *self;
+        for at in (0..PANEL).step_by(V * L::F32_LANES) {
+            let zero = [lanes.splat_f32s(0.0); V];
+            let (mut x, mut y, mut z) = (zero, zero, zero);
+            for step in steps {
+                let (strip, [dx, dy, dz]) = (strips.strip(step.column), step.by[f]);
+                let dx = lanes.splat_f32s(S::scaled(&strip, dx));
+                let dy = lanes.splat_f32s(S::scaled(&strip, dy));
+                let dz = lanes.splat_f32s(S::scaled(&strip, dz));
+                for v in 0..V {
+                    let numbers = S::load(lanes, &strip, at + v * L::F32_LANES);
+                    x[v] = lanes.fused(numbers, dx, x[v]);
+                    y[v] = lanes.fused(numbers, dy, y[v]);
+                    z[v] = lanes.fused(numbers, dz, z[v]);
+                }
             }
-        }
-    }
-    if count == PANEL {
-        let (from, out) = (from.as_flattened(), out.as_flattened_mut());
-        for at in (0..PANEL).step_by(L::F32_LANES) {
-            let [x, y, z] = lanes.load_points(&from[3 * at..]);
-            let x = lanes.add_f32s(x, lanes.load(&sums[0][at..]));
-            let y = lanes.add_f32s(y, lanes.load(&sums[1][at..]));
-            let z = lanes.add_f32s(z, lanes.load(&sums[2][at..]));
-            lanes.store_points(&mut out[3 * at..], [x, y, z]);
-        }
-    } else {
-        for (i, (out, from)) in out.iter_mut().zip(from).enumerate() {
-            *out = [from[0] + sums[0][i], from[1] + sums[1][i], from[2] + sums[2][i]];
-        }
-    }
-    if let Some(offsets) = product.offsets {
-        for (x, offset) in out.as_flattened_mut().iter_mut().zip(offsets[start..].as_flattened()) {
-            *x += offset;
+            for v in 0..V {
+                let row = at + v * L::F32_LANES;
+                if let Some(mask) = mask {
+                    let part = lanes.load(&mask[row..]);
+                    x[v] = lanes.mul_f32s(x[v], part);
+                    y[v] = lanes.mul_f32s(y[v], part);
+                    z[v] = lanes.mul_f32s(z[v], part);
+                }
+                x[v] = lanes.add_f32s(lanes.load(&from[0].0[row..]), x[v]);
+                y[v] = lanes.add_f32s(lanes.load(&from[1].0[row..]), y[v]);
+                z[v] = lanes.add_f32s(lanes.load(&from[2].0[row..]), z[v]);
+                lanes.store_points(&mut out[3 * row..], [x[v], y[v], z[v]]);
+            }
         }
     }
 }

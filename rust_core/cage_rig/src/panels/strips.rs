@@ -25,12 +25,16 @@ pub(super) trait Strips: Copy {
 /// One column of a panel, a whole number of cache lines.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(128))]
-pub(super) struct Single([f32; PANEL]);
+pub(super) struct Single(pub(super) [f32; PANEL]);
 
 /// The same in 16 bits.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Half([i16; PANEL]);
+
+impl Single {
+    pub(super) const ZERO: Self = Self([0.0; PANEL]);
+}
 
 impl<'a> Strips for &'a [Single] {
     type Strip = &'a Single;
@@ -72,7 +76,7 @@ impl<'a> Strips for (&'a [Half], &'a [f32]) {
 
 /// Strips of zeros.
 pub(super) fn singles(count: usize) -> Vec<Single> {
-    vec![Single([0.0; PANEL]); count]
+    vec![Single::ZERO; count]
 }
 
 /// Strips of zeros and their scales.

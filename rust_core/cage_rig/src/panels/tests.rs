@@ -1,6 +1,6 @@
 //! Products on every path, against sums in double precision.
 
-use super::{Panels, Precision, Product, Step, FRAMES, PANEL};
+use super::{Apart, Panels, Precision, Product, Step, FRAMES, PANEL};
 use crate::fixtures::{self, random::Random};
 use crate::progress::unwatched;
 use crate::rows::Rows;
@@ -33,11 +33,12 @@ fn steps<const F: usize>(columns: usize, random: &mut Random) -> Vec<Step<F>> {
 
 /// The largest error of a coordinate.
 fn error(matrix: &Rows, product: &Product, steps: &[Step], found: &[[f32; 3]]) -> f64 {
+    let from = product.from.points();
     let exact = |i: usize, d: usize| {
         let terms = steps.iter().map(|step| matrix.row(i)[step.column] * f64::from(step.by[0][d]));
         let part = product.mask.map_or(1.0, |mask| f64::from(mask[i]));
         let offset = product.offsets.map_or(0.0, |offsets| f64::from(offsets[i][d]));
-        f64::from(product.from[i][d]) + part * terms.sum::<f64>() + offset
+        f64::from(from[i][d]) + part * terms.sum::<f64>() + offset
     };
     let errors = (0..3 * found.len()).map(|n| (f64::from(found[n / 3][n % 3]) - exact(n / 3, n % 3)).abs());
     errors.fold(0.0, f64::max)
@@ -57,7 +58,7 @@ fn every_path_agrees_with_the_sums() {
                 for (mask, offsets) in [(None, None), (Some(&mask), None), (Some(&mask), Some(&offsets))] {
                     let product = Product {
                         path,
-                        from: &from,
+                        from: &Apart::new(&from),
                         mask: mask.map(|mask| &mask[..]),
                         offsets: offsets.map(|offsets| &offsets[..]),
                     };
@@ -78,7 +79,7 @@ fn no_movement_is_exact() {
     let from = points(77, &mut random);
     for path in Path::available() {
         let mut out = vec![[f32::NAN; 3]; 77];
-        panels.write(&Product { path, from: &from, mask: None, offsets: None }, &[], &mut out);
+        panels.write(&Product { path, from: &Apart::new(&from), mask: None, offsets: None }, &[], &mut out);
         assert_eq!(out, from);
     }
 }
@@ -88,7 +89,7 @@ fn chosen_columns_are_those_of_the_matrix() {
     let mut random = Random::new(3);
     let matrix = coordinates(70, 10, &mut random);
     let from = points(70, &mut random);
-    let product = Product { path: Path::default(), from: &from, mask: None, offsets: None };
+    let product = Product { path: Path::default(), from: &Apart::new(&from), mask: None, offsets: None };
     for precision in [Precision::Single, Precision::Half] {
         let panels = packed(&matrix, precision);
         let moved: Vec<Step> =
@@ -112,7 +113,7 @@ fn threads_and_several_frames_change_no_bit() {
     for precision in [Precision::Single, Precision::Half] {
         let panels = packed(&matrix, precision);
         for path in Path::available() {
-            let product = Product { path, from: &from, mask: None, offsets: None };
+            let product = Product { path, from: &Apart::new(&from), mask: None, offsets: None };
             let mut frames = vec![from.clone(); FRAMES];
             let [a, b, c, d] = &mut frames[..] else { unreachable!("four frames") };
             panels.write_frames(&product, &steps, [a, b, c, d]);
@@ -123,8 +124,7 @@ fn threads_and_several_frames_change_no_bit() {
                 panels.write(&product, &alone, &mut out);
                 assert!(out == *frame, "{} frame {f}", path.name());
                 // The first rows alone are too few for threads.
-                let few = Product { from: &from[..640], ..product };
-                panels.write(&few, &alone, &mut out[..640]);
+                panels.write(&product, &alone, &mut out[..640]);
                 assert!(out[..640] == frame[..640], "{} frame {f}", path.name());
             }
         }
@@ -143,7 +143,7 @@ fn sixteen_bits_keep_displacements_and_what_moves_as_a_whole() {
         let mut out = from.clone();
         let whole: Vec<Step> = (0..columns).map(|column| Step { column, by: [[1.0, -2.0, 0.5]] }).collect();
         for path in Path::available() {
-            let product = Product { path, from: &from, mask: None, offsets: None };
+            let product = Product { path, from: &Apart::new(&from), mask: None, offsets: None };
             panels.write(&product, &whole, &mut out);
             let far = error(&matrix, &product, &whole, &out);
             assert!(far <= 2e-5 * 2.0, "{far:e}");

@@ -237,7 +237,7 @@ impl Binding {
         let [integrating, packing] = part.split([30.0, 1.0]);
         let (skin, weights) = (self.rest_skin.at_bind(), &self.packed_weights);
         let integrate = |values: &Rows| {
-            centers(skin, &self.skin_triangles, weights, values, &self.center_options, &integrating)
+            centers(&skin, &self.skin_triangles, weights, values, &self.center_options, &integrating)
         };
         let Some(reach) = &self.reach else {
             return self.given_centers(integrate(&self.cage_coords)?, &packing);

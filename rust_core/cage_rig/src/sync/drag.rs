@@ -5,7 +5,7 @@
 //! once. Nothing is added to what a drag itself has made, so nothing drifts however long it is.
 
 use super::rest_skin::{Confines, RestSkin};
-use crate::panels::{Panels, Step};
+use crate::panels::{Apart, Panels, Step};
 use crate::points::{to_single, Point};
 
 /// A drag moves at most this part of the cage, and at most so many vertices.
@@ -25,7 +25,7 @@ pub enum Pass {
 pub(super) struct Columns<'a> {
     pub(super) panels: &'a Panels,
     pub(super) steps: &'a [Step],
-    pub(super) from: &'a [[f32; 3]],
+    pub(super) from: &'a Apart,
 }
 
 /// What a rest skin (or centers) keeps between passes.
@@ -39,12 +39,14 @@ pub struct Drag {
     near: Option<Near>,
     /// Of the present pass.
     pub(super) steps: Vec<Step>,
+    /// Cage vertices that are elsewhere than in C_b.
+    apart: Vec<usize>,
 }
 
 #[derive(Debug, Clone)]
 struct Near {
     cage: Vec<Point>,
-    skin: Vec<[f32; 3]>,
+    skin: Apart,
     /// K.
     moved: Vec<usize>,
     columns: Panels,
@@ -72,37 +74,34 @@ impl Drag {
         written: &[[f32; 3]],
     ) -> Option<Columns<'_>> {
         let most = (cage.len() / PART).min(MOST);
-        if self.last.is_empty() || differing(cage, &self.last).nth(most).is_some() {
-            return None;
+        if !self.near.as_ref().is_some_and(|near| differ_in(cage, &near.cage, most, &mut self.apart)) {
+            if self.last.is_empty() || !differ_in(cage, &self.last, most, &mut self.apart) {
+                return None;
+            }
+            self.begin(skin, confines, written);
         }
-        let near = match self.near.take() {
-            Some(near) if differing(cage, &near.cage).nth(most).is_none() => near.with(cage, skin),
-            kept => self.begin(kept, skin, confines, written).with(cage, skin),
-        };
+        let near = self.near.as_mut()?;
+        near.take_in(&self.apart, skin);
         let by = |&k: &usize| to_single(&(cage[k] - near.cage[k]));
         self.steps.clear();
         let moved = near.moved.iter().enumerate();
         self.steps.extend(moved.map(|(column, k)| Step { column, by: [by(k)] }));
-        let near = self.near.insert(near);
         Some(Columns { panels: &near.columns, steps: &self.steps, from: &near.skin })
     }
 
     /// A drag from where the last pass ended, in the memory of the one before it.
-    fn begin(
-        &mut self,
-        kept: Option<Near>,
-        skin: &RestSkin,
-        confines: &Confines,
-        written: &[[f32; 3]],
-    ) -> Near {
-        let mut place = kept.map_or_else(Vec::new, |near| near.skin);
-        place.clear();
-        place.extend_from_slice(written);
-        if !self.plain {
+    fn begin(&mut self, skin: &RestSkin, confines: &Confines, written: &[[f32; 3]]) {
+        let mut place = self.near.take().map_or_else(Apart::default, |near| near.skin);
+        if self.plain {
+            place.keep(written);
+        } else {
             let bare = Confines { offsets: None, ..*confines };
-            skin.write_whole(&self.last, &bare, &mut self.steps, &mut place);
+            let mut whole = written.to_vec();
+            skin.write_whole(&self.last, &bare, &mut self.steps, &mut whole);
+            place.keep(&whole);
         }
-        Near { cage: self.last.clone(), skin: place, moved: Vec::new(), columns: skin.coords().select(&[]) }
+        let columns = skin.coords().select(&[]);
+        self.near = Some(Near { cage: self.last.clone(), skin: place, moved: Vec::new(), columns });
     }
 
     /// The pass to `cage` is done.
@@ -114,18 +113,21 @@ impl Drag {
 }
 
 impl Near {
-    /// With the columns of all that `cage` moves.
-    fn with(mut self, cage: &[Point], skin: &RestSkin) -> Self {
-        if differing(cage, &self.cage).any(|k| !self.moved.contains(&k)) {
-            self.moved.extend(differing(cage, &self.cage));
+    /// Keeps the columns of all that is `apart` from C_b.
+    fn take_in(&mut self, apart: &[usize], skin: &RestSkin) {
+        if apart.iter().any(|k| !self.moved.contains(k)) {
+            self.moved.extend(apart);
             self.moved.sort_unstable();
             self.moved.dedup();
             self.columns = skin.coords().select(&self.moved);
         }
-        self
     }
 }
 
-fn differing<'a>(a: &'a [Point], b: &'a [Point]) -> impl Iterator<Item = usize> + 'a {
-    (0..a.len()).filter(|&k| a[k] != b[k])
+/// Whether two cages differ in at most so many vertices, which `apart` has then.
+fn differ_in(a: &[Point], b: &[Point], most: usize, apart: &mut Vec<usize>) -> bool {
+    apart.clear();
+    let differing = a.iter().zip(b).enumerate().filter(|(_, (a, b))| a != b);
+    apart.extend(differing.map(|(k, _)| k).take(most + 1));
+    apart.len() <= most
 }

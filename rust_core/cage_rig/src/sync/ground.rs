@@ -122,7 +122,7 @@ impl Ground {
 
 fn surroundings(binding: &Binding, part: &Part) -> Result<Surroundings, Cancelled> {
     let joints = binding.skeleton_updater.skeleton().joints();
-    Surroundings::new(binding.rest_skin.at_bind(), joints, part)
+    Surroundings::new(&binding.rest_skin.at_bind(), joints, part)
 }
 
 fn add(sum: &mut [Point], other: &[Point]) {

@@ -106,7 +106,7 @@ impl CoupledRig {
             None => None,
         };
         let joints = ground.joints(&binding, binding.cage.vertices());
-        let rest = binding.rest_skin.at_bind().to_vec();
+        let rest = binding.rest_skin.at_bind();
         let mut rig = Self {
             centers,
             rest_cage: binding.cage.vertices().to_vec(),

@@ -30,7 +30,7 @@ impl RestCenters {
         part: &Part,
     ) -> Result<Self, Cancelled> {
         let mover = RestSkin::new(at_bind, cage, &coords, precision, part)?;
-        Ok(Self { coords, centers: mover.at_bind().to_vec(), mover, drag: Drag::new(cage), stale: true })
+        Ok(Self { coords, centers: mover.at_bind(), mover, drag: Drag::new(cage), stale: true })
     }
 
     pub(super) fn mover(&self) -> &RestSkin {

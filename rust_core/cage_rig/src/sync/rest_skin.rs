@@ -4,7 +4,7 @@
 //! is in Φ, and only the columns of cage vertices that moved cost anything: `#M` per moved vertex.
 
 use super::drag::{Columns, Drag, Pass};
-use crate::panels::{Panels, Precision, Product, Step, FRAMES};
+use crate::panels::{Apart, Panels, Precision, Product, Step, FRAMES};
 use crate::points::{to_f32, to_single, Point};
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
@@ -13,7 +13,7 @@ use crate::simd::Path;
 /// M₀, C₀ and Φ.
 #[derive(Debug, Clone)]
 pub struct RestSkin {
-    skin: Vec<[f32; 3]>,
+    skin: Apart,
     cage: Vec<Point>,
     coords: Panels,
 }
@@ -40,12 +40,12 @@ impl RestSkin {
         part: &Part,
     ) -> Result<Self, Cancelled> {
         let coords = Panels::new(cage_coords, precision, part)?;
-        Ok(Self { skin: to_f32(skin), cage: cage.to_vec(), coords })
+        Ok(Self { skin: Apart::new(&to_f32(skin)), cage: cage.to_vec(), coords })
     }
 
     /// M₀, `#M by 3`.
-    pub fn at_bind(&self) -> &[[f32; 3]] {
-        &self.skin
+    pub fn at_bind(&self) -> Vec<[f32; 3]> {
+        self.skin.points()
     }
 
     pub(super) fn coords(&self) -> &Panels {
