@@ -112,6 +112,8 @@ def register() -> None:
 def unregister() -> None:
     atexit.unregister(_remove)
     _remove()
+    if isinstance(bpy.data, bpy.types.BlendData):  # not while Blender starts
+        saving.begin()
     sync.forget()
 
 

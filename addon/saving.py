@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""While a file is written its suspended Armature modifiers have their vertex groups.
+"""While a file is written, and when the add-on goes, suspended Armature modifiers have their vertex groups.
 
 So they do in whatever reads the file without Cage Rig: there nobody gives them back when an artist shows the modifier.
 """
@@ -13,7 +13,7 @@ from .adapters import stack
 
 
 def begin() -> None:
-    """Before the file is written."""
+    """Before the file is written, or the add-on goes."""
     stack.wake_suspended(_suspending(registry.rigs()))
 
 

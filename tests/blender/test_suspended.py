@@ -108,3 +108,17 @@ def test_a_save_while_paused_leaves_it_shown(bar: Rig, tmp_path: Path) -> None:
     update()
     assert suspended(bar).use_vertex_groups and suspended(bar).show_viewport
     assert np.abs(shown(bar.skin) - rest(bar.skin)).max() > 0.1
+
+
+def test_it_is_whole_while_the_add_on_is_disabled_and_rests_again_after(bar: Rig) -> None:
+    import addon_utils
+
+    bend(bar, 1.0)
+    plain, module = native(bar.skin), "bl_ext.user_default.cage_rig"
+    addon_utils.disable(module)
+    assert suspended(bar).use_vertex_groups
+    assert np.abs(posed_by(suspended(bar)) - plain).max() < 1e-6
+    suspended(bar).show_viewport, bar.skin.modifiers["Cage Rig"].show_viewport = False, True
+    addon_utils.enable(module)
+    update()
+    assert bpy.data.objects["BarCage"].cage_rig.state == "LIVE" and not suspended(bar).use_vertex_groups
