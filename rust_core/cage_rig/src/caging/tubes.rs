@@ -17,6 +17,13 @@ use crate::points::Point;
 /// A cage grows so far beyond its sections before it is tightened.
 pub(crate) const BEYOND: f64 = 1.05;
 
+/// The middle of a branching node is looked for at steps of one part in so many between its sections;
+/// half as many where there are more than these.
+const PARTS: usize = 6;
+const MANY: usize = 5;
+/// A middle nearer to the plane of symmetry is on it.
+const PLANE: f64 = 1e-9;
+
 /// The faces of a cage and the axis inside it. Unit space.
 #[derive(Debug, Clone)]
 pub(crate) struct Scaffold {
@@ -167,7 +174,7 @@ impl Scaffold {
         members: &[(usize, bool)],
         ring: &impl Fn(usize) -> Vec<u32>,
     ) -> Option<Point> {
-        let mean = members.iter().map(|(n, _)| self.centers[*n]).sum::<Point>() / members.len() as f64;
+        let sections: Vec<Point> = members.iter().map(|(node, _)| self.centers[*node]).collect();
         let rings: Vec<Vec<u32>> = members
             .iter()
             .map(|(node, away)| {
@@ -178,8 +185,7 @@ impl Scaffold {
                 ring
             })
             .collect();
-        for blend in [0.5, 0.25, 0.75, 0.0, 1.0] {
-            let center = start + (mean - start) * blend;
+        for center in middles(start, &sections) {
             if let Some(faces) = self.star(&center, &rings) {
                 self.polygons.extend(faces);
                 return Some(center);
@@ -242,6 +248,36 @@ impl Scaffold {
             }
         }
     }
+}
+
+/// Places for the middle of a branching node: on the way from where it is to the mean of its sections,
+/// then anywhere between these, the nearest first. Limbs that all lead to one side have none on the way.
+fn middles(start: &Point, sections: &[Point]) -> Vec<Point> {
+    let mean = sections.iter().sum::<Point>() / sections.len() as f64;
+    let on_way = |blend: f64| start + (mean - start) * blend;
+    let mut found = [0.5, 0.25, 0.75, 0.0, 1.0].map(on_way).to_vec();
+    let among: Vec<Point> = sections.iter().chain([start]).copied().collect();
+    let parts = if among.len() <= MANY { PARTS } else { PARTS / 2 };
+    let place = |share: &Vec<usize>| -> Point {
+        share.iter().zip(&among).map(|(k, p)| p * (*k as f64 / parts as f64)).sum()
+    };
+    let mut between: Vec<Point> = shares(among.len(), parts).iter().map(place).collect();
+    if start.x.abs() < PLANE && mean.x.abs() < PLANE {
+        between.retain(|p| p.x.abs() < PLANE);
+    }
+    between.sort_by(|p, q| (p - found[0]).norm().total_cmp(&(q - found[0]).norm()));
+    found.extend(between);
+    found
+}
+
+/// All ways to share so many parts among `n`.
+fn shares(n: usize, parts: usize) -> Vec<Vec<usize>> {
+    if n <= 1 {
+        return vec![vec![parts; n]];
+    }
+    let with =
+        |own: usize| shares(n - 1, parts - own).into_iter().map(move |rest| [vec![own], rest].concat());
+    (0..=parts).flat_map(with).collect()
 }
 
 /// Puts the edge `a` `b` into a triangulation of the sphere by flips. `None` when it can't be.
@@ -324,5 +360,28 @@ mod tests {
         }
         assert!(edges.values().all(|sum| *sum == 0));
         assert_eq!(built.triangles().len(), 2 * 24 - 4);
+    }
+
+    #[test]
+    fn limbs_that_lead_to_one_side_are_joined_about_a_place_between_them() {
+        // Two that lean toward each other: the mean of all is in front of them, not behind.
+        let at = |(x, y, u, v): (f64, f64, f64, f64)| {
+            quad(Point::new(x, y, 0.0), Point::new(u, v, 0.0).normalize(), 0.1)
+        };
+        let found = [(-1.0, 0.3, 0.12, 1.0), (0.0, 0.0, 0.0, -1.0), (1.0, 0.3, -0.12, 1.0)].map(at).to_vec();
+        let mut built = Scaffold {
+            corners: found.iter().flat_map(|s| s.corners.clone()).collect(),
+            start: found.iter().flat_map(|s| s.corners.clone()).collect(),
+            owner: (0..12).map(|v| v / 4).collect(),
+            centers: found.iter().map(|s| s.center).collect(),
+            polygons: Vec::new(),
+            axis: Axis::default(),
+        };
+        let members: Vec<(usize, bool)> = (0..3).map(|n| (n, true)).collect();
+        let ring = |n: usize| (0..4).map(|k| (4 * n + k) as u32).collect::<Vec<u32>>();
+        let center = built.branch(&Point::new(0.0, 0.6, 0.0), &members, &ring).expect("a place");
+        assert!(center.x == 0.0 && center.y > 0.0 && center.y < 0.18, "{center}");
+        assert_eq!(built.polygons.len(), 2 * 12 - 4 - 3 * 2);
+        assert_eq!(shares(3, 2).len(), 6);
     }
 }
