@@ -18,6 +18,7 @@ Matrix = NDArray[np.float64]
 Written = dict[int, tuple[int, bytes]]  # skin index -> (session revision, its matrix) of the last write
 
 
+FLAT = 1e-12  # a box of so little volume, relative to its longest edge's cube, has none
 _UNREADABLE = (
     "modifiers after Cage Rig on '{obj.name}' reorder its vertices, so that {what} can't be read; "
     "switch one or the other off"
@@ -52,14 +53,25 @@ def place(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph, kn
 
 
 def to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, bool]:
-    """Matrix from skin `index` to the armature's space now, and whether it is still that of the bind."""
+    """Matrix from skin `index` to the armature's space now, and whether it is still that of the bind.
+
+    That of the bind too where either is scaled to nothing, as animators hide characters: what is flat has no inverse.
+    """
     skin = cage.cage_rig.skins[index]
     bones = cage.cage_rig.armature.evaluated_get(depsgraph).matrix_world
     world = skin.object.evaluated_get(depsgraph).matrix_world
-    bound, now = np.array(skin.skin_to_rig, np.float64), np.array(bones.inverted_safe() @ world, np.float64)
+    bound = np.array(skin.skin_to_rig, np.float64)
+    if _is_flat(bones) or _is_flat(world):
+        return bound, True
+    now = np.array(bones.inverted() @ world, np.float64)
     far = 1.0 + max(float(np.abs(np.array(world)).max()), float(np.abs(np.array(bones)).max()))
     still = bool(np.allclose(now, bound, rtol=0.0, atol=2e-6 * far))
     return (bound, True) if still else (now, False)
+
+
+def _is_flat(world: object) -> bool:
+    axes = np.array(world, np.float64)[:3, :3]
+    return bool(abs(np.linalg.det(axes)) <= FLAT * np.abs(axes).max() ** 3)
 
 
 @dataclass

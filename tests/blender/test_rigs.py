@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 import truth
-from scene import Rig, bind, fat_key, rest, select, set_mesh, shown, update
+from scene import Rig, bend, bind, fat_key, rest, select, set_mesh, shown, update
 
 from blend_fixtures import rigs
 from blend_fixtures.build import RigObjects
@@ -150,6 +150,25 @@ def test_a_very_small_armature_object_binds() -> None:
     rig = bind(objects)
     bpy.context.scene.frame_set(13)
     assert truth.worst_against_blender(rig) < 1e-5
+
+
+@pytest.mark.parametrize("hidden", ["the_root", "the_armature", "the_skin"])
+@pytest.mark.parametrize("scale", [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0)])
+def test_a_character_scaled_to_nothing_stays_live(bar: Rig, hidden: str, scale: tuple[float, float, float]) -> None:
+    rig = bar
+    bend(rig, 1.0)
+    before = shown(rig.skin)
+    root = bpy.data.objects.new("Root", None)
+    bpy.context.scene.collection.objects.link(root)
+    rig.armature.parent = rig.skin.parent = root
+    obj = {"the_root": root, "the_armature": rig.armature, "the_skin": rig.skin}[hidden]
+    for frame, factor in ((1, (1.0, 1.0, 1.0)), (2, scale), (3, (1.0, 1.0, 1.0))):
+        obj.scale = factor
+        obj.keyframe_insert("scale", frame=frame)
+    for frame in (1, 2, 3):
+        bpy.context.scene.frame_set(frame)
+        assert (rig.settings.state, rig.settings.message) == ("LIVE", "")
+        assert np.abs(shown(rig.skin) - before).max() < 1e-6, frame
 
 
 def envelope_multiplied(objects: RigObjects) -> str:
