@@ -61,7 +61,7 @@ def to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -
     bones = cage.cage_rig.armature.evaluated_get(depsgraph).matrix_world
     world = skin.object.evaluated_get(depsgraph).matrix_world
     bound = np.array(skin.skin_to_rig, np.float64)
-    if _is_flat(bones) or _is_flat(world):
+    if is_flat(bones) or is_flat(world):
         return bound, True
     now = np.array(bones.inverted() @ world, np.float64)
     far = 1.0 + max(float(np.abs(np.array(world)).max()), float(np.abs(np.array(bones)).max()))
@@ -69,7 +69,8 @@ def to_rig(cage: bpy.types.Object, index: int, depsgraph: bpy.types.Depsgraph) -
     return (bound, True) if still else (now, False)
 
 
-def _is_flat(world: object) -> bool:
+def is_flat(world: object) -> bool:
+    """Whether this 4 by 4 matrix scales a direction to nothing, so that it has no inverse."""
     axes = np.array(world, np.float64)[:3, :3]
     return bool(abs(np.linalg.det(axes)) <= FLAT * np.abs(axes).max() ** 3)
 

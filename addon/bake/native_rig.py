@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 
 from ..adapters import armature, positions, shape_keys
+from ..skins import is_flat
 from .drafts import draft
 from .live import BakeError, Steps, playing, refuse_unready, rigs, times
 from .native_bones import copy_armature, key_bones
@@ -105,11 +106,17 @@ def _alone(natives: list[bpy.types.Object], bones: bpy.types.Object) -> Iterator
 def _difference(
     seen: Recording, natives: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, time: float
 ) -> tuple[float, float, str]:
-    """How far the new skins are from the live ones now, as a share of the character's size, and the bone there."""
-    to_rig = np.linalg.inv(armature.to_array(seen.source.evaluated_get(depsgraph).matrix_world))
+    """How far the new skins are from the live ones now, as a share of the character's size, and the bone there.
+
+    What is scaled to nothing differs in nothing.
+    """
+    bones = armature.to_array(seen.source.evaluated_get(depsgraph).matrix_world)
     worst = (0.0, time, "")
     for skin, obj in zip(seen.skins, natives, strict=True):
-        placed = to_rig @ armature.to_array(obj.evaluated_get(depsgraph).matrix_world)
+        world = armature.to_array(obj.evaluated_get(depsgraph).matrix_world)
+        if is_flat(world):
+            continue
+        placed = skin.to_rig[seen.times.index(time)] if is_flat(bones) else np.linalg.inv(bones) @ world
         native = positions.apply_matrix(placed, positions.read_evaluated(obj, depsgraph))
         live = skin.skin.session.posed_skin(skin.skin.index)
         off = np.linalg.norm(native - live, axis=1) / seen.size

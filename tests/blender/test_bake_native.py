@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import bpy
 import numpy as np
 import pytest
 from baked import bake, go_to, shaped_rig, untouched, worst
@@ -38,6 +39,22 @@ def plays_alone(made: object) -> None:
     assert inherited <= {(True, True, "FULL")}, "a scene graph that every exporter can write"
     owners = [made.armature, made.armature.data, *made.skins]
     assert not any(owner.animation_data.drivers for owner in owners if owner.animation_data)
+
+
+@pytest.mark.parametrize("through", ["a root", "the skin"])
+def test_frames_at_which_the_character_is_scaled_to_nothing_are_baked(bar: Rig, through: str) -> None:
+    bend(bar, 1.0)
+    obj = bar.skin
+    if through == "a root":
+        obj = bpy.data.objects.new("Root", None)
+        bpy.context.scene.collection.objects.link(obj)
+        bar.armature.parent = bar.skin.parent = obj
+    for frame, scale in ((1, 1.0), (2, 0.0), (3, 1.0)):
+        obj.scale = (scale, scale, scale)
+        obj.keyframe_insert("scale", frame=frame)
+    made = bake().to_native_rig(bar.cage, 1, 3)
+    assert made.error < 1e-5
+    assert worst(bar, made.skins, (1, 3)) < 1e-5
 
 
 @pytest.mark.parametrize("name", rigs.RIGS)
