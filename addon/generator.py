@@ -22,9 +22,12 @@ Faces = tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]]]  # corners, si
 class Refusal(Exception):
     """The core has no cage; the message is its sentence. With the skeleton's node and the place, where it has them."""
 
-    def __init__(self, message: str, node: int | None = None, place: Points | None = None) -> None:
+    def __init__(
+        self, message: str, node: int | None = None, place: Points | None = None, section: int | None = None
+    ) -> None:
         super().__init__(message)
         self.node, self.place = node, place
+        self.section = section  # of a cage to be like
 
     @property
     def is_of_skin(self) -> bool:
@@ -67,6 +70,15 @@ class Earlier(NamedTuple):
     bending: Points | None
     points: Points
     faces: Faces
+    arrangement: list[int] | None = None  # of its report
+
+
+class Like(NamedTuple):
+    """A generated cage whose sections and faces another one is to have, in rig space."""
+
+    points: Points
+    faces: Faces
+    corners: int  # of a section
 
 
 @dataclass(frozen=True)
@@ -114,7 +126,7 @@ def _door(function: Callable[P, R]) -> Callable[P, R]:
             raise Cancelled from cancelled
         except cage_rig_core.CagingError as error:
             place = None if error.place is None else np.array(error.place)
-            raise Refusal(str(error), error.node, place) from error
+            raise Refusal(str(error), error.node, place, error.section) from error
         except ValueError as error:
             raise Refusal(str(error)) from error
         except cage_rig_core.PanicException as panic:
@@ -173,14 +185,15 @@ class Generator:
         self._core = cage_rig_core.CageGenerator(*skin, *skeleton, options=given.options)
 
     @_door
-    def sections(self, bending: Points | None = None) -> list[Section]:
-        """Control nodes and their sections; `bending` (`#B by 3`) instead of those that are placed."""
-        return [_section(found) for found in self._core.sections(bending)]
+    def sections(self, bending: Points | None = None, like: Like | None = None) -> list[Section]:
+        """Control nodes and their sections; `bending` (`#B by 3`) instead of those that are placed, or of `like`."""
+        return [_section(found) for found in self._core.sections(bending, like=like)]
 
     @_door
-    def start(self, bending: Points | None = None, earlier: Earlier | None = None) -> Job:
+    def start(self, bending: Points | None = None, earlier: Earlier | None = None, like: Like | None = None) -> Job:
         """Begin to make the cage. What an earlier one has around nodes that are still there stays."""
-        return Job(self._core.generate(bending, earlier))
+        arrangement = None if earlier is None else earlier.arrangement
+        return Job(self._core.generate(bending, earlier and earlier[:3], like=like, arrangement=arrangement))
 
     @property
     def arcs(self) -> list[Arc]:

@@ -260,6 +260,8 @@ class CageRigGenerated(bpy.types.PropertyGroup):
     detail: FloatProperty()
     symmetry: BoolProperty(default=True)
     hull: BoolProperty()
+    like: PointerProperty(type=bpy.types.Object, name="Like", description="Whose cross sections and faces it has")
+    arrangement: StringProperty(description="Of the arcs of the skeleton, where they are in another cage's order")
 
 
 def rig_of(obj: bpy.types.Object | None) -> bpy.types.Object | None:

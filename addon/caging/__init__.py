@@ -17,13 +17,14 @@ from collections.abc import Callable
 import bpy
 
 from ..generator import Cancelled, Job, Refusal
-from . import character, refusals, result
+from . import alike, character, refusals, result
+from .alike import corners_of
 from .character import Character
 from .course import OnBone
 from .editing import Editing, Source
 from .options import Options
 from .refusals import GenerateError
-from .result import SECTION, nodes_of, options_of, refuse_cage
+from .result import SECTION, like_of, nodes_of, options_of, refuse_cage
 
 __all__ = [
     "SECTION",
@@ -35,9 +36,11 @@ __all__ = [
     "OnBone",
     "Options",
     "Source",
+    "corners_of",
     "edit",
     "finish",
     "generate_cage",
+    "like_of",
     "make",
     "nodes_of",
     "open_character",
@@ -56,6 +59,7 @@ def generate_cage(
     *,
     nodes: list[OnBone] | None = None,
     cage: bpy.types.Object | None = None,
+    like: bpy.types.Object | None = None,
     tell: Callable[[str], object] | None = None,
     watch: Callable[[Job], object] | None = None,
 ) -> bpy.types.Object:
@@ -64,13 +68,16 @@ def generate_cage(
     Without an armature (None) the core looks for a skeleton in the skin.
 
     `nodes`: bending nodes as (bone, position), 0 at the bone's head and 1 at its tail; else they are placed. `cage`: an
-    object that gets the new mesh in place of its own, with the nodes that it remembers unless others are given. `tell`
-    gets a sentence on what was made, `watch` the job twice a second while it works.
+    object that gets the new mesh in place of its own, with the nodes that it remembers unless others are given. `like`:
+    a generated cage whose cross sections and faces, index for index, the new one gets. `tell` gets a sentence on what
+    was made, `watch` the job twice a second while it works.
     """
     if cage is not None:
         options = options or options_of(cage)
         nodes = nodes_of(cage) if nodes is None else nodes
-    return make(context, skins, armature, options or Options(), nodes, cage=cage, tell=tell, watch=watch)
+        like = like or like_of(cage)
+    options = options or (Options() if like is None else Options(corners=corners_of(like)))
+    return make(context, skins, armature, options, nodes, cage=cage, like=like, tell=tell, watch=watch)
 
 
 def make(
@@ -81,13 +88,14 @@ def make(
     nodes: list[OnBone] | None,
     *,
     cage: bpy.types.Object | None,
+    like: bpy.types.Object | None = None,
     tell: Callable[[str], object] | None,
     watch: Callable[[Job], object] | None = None,
 ) -> bpy.types.Object:
     """As `generate_cage`, but nothing is taken from the cage."""
     if cage is not None:
-        refuse_cage(cage)
-    found = open_character(context, armature, skins, options)
+        refuse_cage(cage, like)
+    found = open_character(context, armature, skins, options, like)
     editing = edit(found, options, nodes)
     try:
         job = start(found, options, editing, cage)
@@ -101,19 +109,27 @@ def make(
 
 def start(found: Character, options: Options, editing: Editing, cage: bpy.types.Object | None) -> Job:
     """Begin to make the cage of these nodes. Sections of `cage` that they leave alone stay as they are."""
-    return found.generator.start(editing.bending, result.earlier(cage, found, options) if cage else None)
+    earlier = result.earlier(cage, found, options) if cage else None
+    return found.generator.start(editing.bending, earlier, found.model and found.model.like)
 
 
 def open_character(
-    context: bpy.types.Context, armature: bpy.types.Object | None, skins: list[bpy.types.Object], options: Options
+    context: bpy.types.Context,
+    armature: bpy.types.Object | None,
+    skins: list[bpy.types.Object],
+    options: Options,
+    like: bpy.types.Object | None = None,
 ) -> Character:
-    """Read a character. Raises `GenerateError`."""
-    return character.read(context, armature, skins, options)
+    """Read a character, to be caged like another one or not. Raises `GenerateError`."""
+    return character.read(context, armature, skins, options, like)
 
 
 def edit(found: Character, options: Options, nodes: list[OnBone] | None) -> Editing:
     """The character's bending nodes, to be edited. Raises `GenerateError`."""
     try:
+        if nodes is None and found.model is not None:
+            sections = found.generator.sections(None, found.model.like)
+            nodes = [found.course.named(found.course.nearest(section.place)) for section in sections if section.bending]
         return Editing(source(found, options), symmetry=options.symmetry, nodes=nodes)
     except Refusal as refusal:
         raise explain(refusal, found) from refusal
@@ -144,4 +160,6 @@ def finish(
 
 def explain(refusal: Refusal, found: Character) -> GenerateError:
     """A refusal of the core in the artist's terms."""
+    if found.model is not None and not refusal.is_of_skin:
+        return alike.explained(refusal, found.model, found.scene)
     return refusals.explained(refusal, found.scene)

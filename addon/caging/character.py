@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import reading
 from ..adapters import hull
 from ..generator import Faces, Generator, Input, Points, Refusal, extract_skeleton
-from . import refusals
+from . import alike, refusals
 from .bones import BoneGraph, bone_graph, curve_graph
 from .course import Course
 from .options import Options
@@ -58,6 +58,7 @@ class Character:
     generator: Generator
     course: Course
     notes: list[str]  # what was done to the skins, in sentences
+    model: alike.Model | None = None  # a cage to be like
 
     @property
     def armature(self) -> bpy.types.Object | None:
@@ -76,7 +77,11 @@ class Character:
 
 
 def read(
-    context: bpy.types.Context, armature: bpy.types.Object | None, skins: list[bpy.types.Object], options: Options
+    context: bpy.types.Context,
+    armature: bpy.types.Object | None,
+    skins: list[bpy.types.Object],
+    options: Options,
+    like: bpy.types.Object | None = None,
 ) -> Character:
     """Read them as Bind does and let the core look at them. Object Mode. Raises `GenerateError`.
 
@@ -103,7 +108,11 @@ def read(
         raise refusals.explained(refusal, scene) from refusal
     notes += _repairs(generator.repairs, scene)
     graph = graph or curve_graph(generator.given.nodes, generator.given.edges)
-    return Character(replace(scene, graph=graph), generator, Course(generator.arcs, graph), notes)
+    course = Course(generator.arcs, graph)
+    model = None if like is None else alike.read(like, armature or skins[0], generator.given.points)
+    if model is not None:
+        alike.refuse_options(model, options.corners)
+    return Character(replace(scene, graph=graph), generator, course, notes, model)
 
 
 def _with_bones(

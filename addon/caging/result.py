@@ -12,16 +12,17 @@ from mathutils import Matrix
 
 from ..adapters import positions, vertex_groups
 from ..generator import Cage, Earlier, Points
+from .alike import SECTION, sections_of
 from .character import Character
 from .course import OnBone
 from .options import Options
 from .refusals import GenerateError
 
-SECTION = "cage_rig_section"
 
-
-def refuse_cage(cage: bpy.types.Object) -> None:
+def refuse_cage(cage: bpy.types.Object, like: bpy.types.Object | None = None) -> None:
     """Raise `GenerateError` where this object can't get a new cage in place of its own."""
+    if cage == like:
+        raise GenerateError(f"'{cage.name}' can't be like itself; choose another cage for Like, or none")
     if cage.cage_rig.state != "NONE":
         raise GenerateError(f"'{cage.name}' is bound; Unbind it, generate it anew, and bind it again")
     if cage.library is not None or cage.data.library is not None or cage.override_library is not None:
@@ -59,6 +60,8 @@ def write(
     if character.armature is not None:
         vertex_groups.write_whole(cage, [bones[owner] for owner in made.owners.tolist()])
     _remember(cage, character, options, nodes)
+    arrangement = made.report["arrangement"]
+    cage.cage_rig_generated.arrangement = "" if arrangement is None else " ".join(map(str, arrangement))
     cage.cage_rig_generated.fingerprint = character.generator.given.fingerprint
     _select(context, cage, character)
     return cage
@@ -93,6 +96,7 @@ def _remember(cage: bpy.types.Object, character: Character, options: Options, no
         kept.skins.add().object = skin
     for name, value in vars(options).items():
         setattr(kept, name, value)
+    kept.like = character.model and character.model.cage
     kept.own_nodes = nodes is not None
     kept.nodes.clear()
     for node in nodes or ():
@@ -120,26 +124,30 @@ def nodes_of(cage: bpy.types.Object) -> list[OnBone] | None:
     return [OnBone(node.name, node.position) for node in kept.nodes] if kept.own_nodes else None
 
 
+def like_of(cage: bpy.types.Object) -> bpy.types.Object | None:
+    """The cage that this one is like, if it is still there."""
+    like = cage.cage_rig_generated.like
+    return like if like is not None and like.users_scene else None
+
+
 def earlier(cage: bpy.types.Object, character: Character, options: Options) -> Earlier | None:
     """What this cage can lend to one with other nodes: nothing where more than nodes has changed since it was made."""
     before, nodes = options_of(cage), nodes_of(cage)
     if nodes is not None:
         before = replace(before, placement=options.placement)  # nothing was placed
-    known = cage.cage_rig_generated.fingerprint == character.generator.given.fingerprint
-    if not known or before.core() != options.core() or SECTION not in cage.data.attributes:
+    kept, owners = cage.cage_rig_generated, sections_of(cage)
+    known = kept.fingerprint == character.generator.given.fingerprint
+    known &= character.model is None or character.model.cage == kept.like
+    if not known or before.core() != options.core() or owners is None:
         return None
-    owners = np.empty(len(cage.data.vertices), np.int32)
-    layer = cage.data.attributes[SECTION]
-    if len(layer.data) != len(owners):
-        return None
-    layer.data.foreach_get("value", owners)
     if not np.array_equal(owners, np.repeat(np.arange(len(owners) // options.corners), options.corners)):
         return None  # the artist has added or deleted vertices
     to_rig = np.linalg.inv(np.array(character.space.matrix_world)) @ np.array(cage.matrix_world)
     points = positions.apply_matrix(to_rig, positions.read_base(cage.data).astype(float))
     course = character.course
     bending = None if nodes is None else course.points(course.places(nodes))
-    return Earlier(bending, points, positions.read_faces(cage.data))
+    arrangement = [int(arc) for arc in kept.arrangement.split()] or None
+    return Earlier(bending, points, positions.read_faces(cage.data), arrangement)
 
 
 def summary(cage: bpy.types.Object, made: Cage, notes: list[str]) -> str:
@@ -150,6 +158,13 @@ def summary(cage: bpy.types.Object, made: Cage, notes: list[str]) -> str:
         f"'{cage.name}': {len(made.points)} vertices in {len(made.sections)} cross sections, {quads} quads and "
         f"{triangles} triangles, {made.report['volume_ratio']:.2f} times the volume of what it encloses"
     )
+    if cage.cage_rig_generated.like is not None and _same_faces(cage, cage.cage_rig_generated.like):
+        text += f", with the faces of '{cage.cage_rig_generated.like.name}'"
     if made.report["kept_vertices"]:
         text += f"; {made.report['kept_vertices']} vertices are where they were"
     return ". ".join([text, *notes])
+
+
+def _same_faces(cage: bpy.types.Object, other: bpy.types.Object) -> bool:
+    pairs = zip(positions.read_faces(cage.data), positions.read_faces(other.data), strict=True)
+    return all(np.array_equal(mine, its) for mine, its in pairs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -27,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--armature", metavar="NAME", help="whose bones to follow; the skins'")
     parser.add_argument("--placement", choices=("automatic", "joints"), default="automatic", help="of cross sections")
-    parser.add_argument("--corners", type=int, default=DEFAULT.corners, metavar="N", help="of a cross section, 3 to 8")
+    parser.add_argument("--corners", type=int, metavar="N", help="of a cross section, 3 to 8; 4, or those of --like")
     parser.add_argument("--triangles", action="store_true", help="no quads")
     parser.add_argument(
         "--clearance",
@@ -51,6 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="limbs thinner than this, relative to the size, get no branch",
     )
     parser.add_argument("--asymmetric", action="store_true", help="also where the character is symmetric")
+    parser.add_argument(
+        "--like", metavar="NAME", help="a cage of the file that was generated: take its cross sections and faces"
+    )
     parser.add_argument("--hull", action="store_true", help="around the skins' repaired hull")
 
 
@@ -61,7 +65,7 @@ def run(given: argparse.Namespace, voice: Voice) -> Answer:
         raise Refusal(f"'{given.out}' is the file that is read; write to another one")
     options = caging.Options(
         placement=given.placement.upper(),
-        corners=given.corners,
+        corners=given.corners or DEFAULT.corners,
         triangles=given.triangles,
         clearance=given.clearance,
         tightness=given.tightness,
@@ -75,12 +79,16 @@ def run(given: argparse.Namespace, voice: Voice) -> Answer:
     armature, skins = _character(given.skin or [], given.armature)
     begun = time.perf_counter()
     said: list[str] = []
+    like = None if given.like is None else _named(given.like, "MESH")
     try:
+        if like is not None and given.corners is None:
+            options = replace(options, corners=caging.corners_of(like))
         cage = caging.generate_cage(
             bpy.context,
             skins,
             armature,
             options,
+            like=like,
             tell=said.append,
             watch=lambda job: voice.progress(job.share, f"generating, {job.stage}:"),
         )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import textwrap
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import caging, lifecycle, props, selection
 from ..caging import current
@@ -60,6 +60,12 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
         name="Cage Repaired Hull",
         description="Enclose a voxel-remeshed copy of the skins: for meshes with holes or crossing parts",
     )
+    like: StringProperty(
+        name="Like",
+        description="A cage that Generate Cage made, for another level of detail of this character: "
+        "the new one gets its cross sections and faces, so that shape keys and weights fit both",
+        options={"SKIP_SAVE"},
+    )
     own_nodes: BoolProperty(
         name="Keep My Nodes", description="Use the bending nodes that were edited instead of placing them"
     )
@@ -100,6 +106,7 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
                     self._options(),
                     nodes,
                     cage=cage,
+                    like=self._like(),
                     tell=self._tell,
                     watch=lambda job: show(job.share),
                 )
@@ -111,7 +118,9 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
         """Start to edit nodes; what can be repaired is asked about."""
         try:
             cage, armature, skins = self._chosen(context)
-            self._run = node_events.Run(context, cage, armature, skins, self._options(), self._own_nodes())
+            self._run = node_events.Run(
+                context, cage, armature, skins, self._options(), self._own_nodes(), self._like()
+            )
         except (caging.GenerateError, lifecycle.BindError) as error:
             if not getattr(error, "repairable", False) or self.hull:
                 return self._refuse(error)
@@ -165,6 +174,7 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
             row = layout.row()
             row.enabled = name != "placement" or not self.own_nodes
             row.prop(self, name)
+        layout.prop_search(self, "like", context.scene, "objects")
 
     def _chosen(
         self, context: bpy.types.Context
@@ -172,15 +182,26 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
         """What is selected; a cage that is made anew lends what was not set."""
         cage, armature, skins = selection.to_generate(context)
         if cage is not None:
-            caging.refuse_cage(cage)
             given = self.properties.is_property_set
+            if not given("like") and caging.like_of(cage) is not None:
+                self.like = caging.like_of(cage).name
+            caging.refuse_cage(cage, self._like())
             for name, value in vars(caging.options_of(cage)).items():
                 if not given(name):
                     setattr(self, name, value)
             nodes = caging.nodes_of(cage)
             if not given("own_nodes") and nodes is not None:
                 self._set_nodes(nodes)
+        elif self.like and not self.properties.is_property_set("corners"):
+            self.corners = caging.corners_of(self._like())
         return cage, armature, skins
+
+    def _like(self) -> bpy.types.Object | None:
+        if not self.like:
+            return None
+        if self.like not in bpy.data.objects:
+            raise caging.GenerateError(f"There is no object '{self.like}' for Like; choose a generated cage, or none")
+        return bpy.data.objects[self.like]
 
     def _options(self) -> caging.Options:
         return caging.Options(**{name: getattr(self, name) for name in OPTIONS})

@@ -42,10 +42,11 @@ class Run:
         skins: list[bpy.types.Object],
         options: caging.Options,
         nodes: list[caging.OnBone] | None,
+        like: bpy.types.Object | None = None,
     ) -> None:
-        self.cage, self.options, self.job = cage, options, None
+        self.cage, self.options, self.job, self._like = cage, options, None, like
         self.job: Job | None
-        self.character = caging.open_character(context, armature, skins, options)
+        self.character = caging.open_character(context, armature, skins, options, like)
         self.editing = caging.edit(self.character, options, nodes)
         # Blender's own highlights would hide ours
         self._selected = [obj for obj in context.view_layer.objects if obj.select_get()]
@@ -201,17 +202,22 @@ class Run:
         """Place nodes anew."""
         options = replace(self.options, placement=placement)
         try:
-            self.character = caging.open_character(context, self.character.armature, self.character.skins, options)
+            self.character = self._opened(context, options)
             self.editing.replace(caging.source(self.character, options))
         except (caging.GenerateError, Refusal) as error:
             self.editing.refuse(str(error), error.place)
+
+    def _opened(self, context: bpy.types.Context, options: caging.Options) -> caging.Character:
+        """The same character, with other options."""
+        found = self.character
+        return caging.open_character(context, found.armature, found.skins, options, self._like)
 
     def _generate(self, context: bpy.types.Context) -> None:
         self.editing.refuse("", None)
         self.editing.hovered = self.editing.offered = None
         # symmetry and placement may have been switched on the way
         self.options = replace(self.options, placement=self.editing.placement)
-        self.character = caging.open_character(context, self.character.armature, self.character.skins, self.options)
+        self.character = self._opened(context, self.options)
         self.job = caging.start(self.character, self.options, self.editing, self.cage)
         self._shown.working = "Generating"
         self._wait = waiting.Wait(context, "Generating the cage", self.job.cancel)

@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 Doubles: TypeAlias = NDArray[np.float64]
 Faces: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike]
 """(#F, 3) vertex indices, or a pair (corner indices, face sizes) for polygons."""
+LikeCage: TypeAlias = tuple[ArrayLike, Faces, int]
+"""Of a generated cage: vertices (#C, 3), section after section, faces, and how many vertices a section has."""
 Weights: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike, ArrayLike]
 """(#M, #J), or a triple (indptr, indices, data)."""
 
@@ -61,6 +63,7 @@ class CagingError(CageRigError):
     """No cage was generated; says where the fault is, as far as it has a place."""
 
     node: int | None  # of the skeleton
+    section: int | None  # of a cage to be like
     place: tuple[float, float, float] | None
     cancelled: bool
 
@@ -315,6 +318,7 @@ class CagingReport(TypedDict):
     min_angle: float  # degrees
     genus: int
     mirror: NDArray[np.int64] | None  # (#C,): each vertex's image in x
+    arrangement: NDArray[np.int64] | None  # like another cage: the arcs in its order, from 1, negative where turned
     timings: dict[str, float]  # seconds
 
 def generate_cage(
@@ -325,6 +329,7 @@ def generate_cage(
     *,
     bending_nodes: ArrayLike | None = None,  # (#B, 3), near the skeleton
     options: CagingOptions | None = None,
+    like: LikeCage | None = None,  # its faces are taken over, index for index
     progress: Callable[[str, float], object] | None = None,  # stage, part; a false answer but None cancels
 ) -> tuple[Doubles, NDArray[np.int64] | tuple[NDArray[np.int64], NDArray[np.int64]], CagingReport]: ...
 def cage_sections(
@@ -351,6 +356,7 @@ class CagingJob:
         *,
         bending_nodes: ArrayLike | None = None,
         options: CagingOptions | None = None,
+        like: LikeCage | None = None,
     ) -> CagingJob: ...
     @property
     def progress(self) -> float: ...  # 0 to 1, never falls
@@ -377,11 +383,14 @@ class CageGenerator:
         *,
         options: CagingOptions | None = None,
     ) -> CageGenerator: ...
-    def sections(self, bending_nodes: ArrayLike | None = None) -> list[Section]: ...
+    def sections(self, bending_nodes: ArrayLike | None = None, *, like: LikeCage | None = None) -> list[Section]: ...
     def generate(
         self,
         bending_nodes: ArrayLike | None = None,
         earlier: tuple[ArrayLike | None, ArrayLike, Faces] | None = None,  # bending nodes, vertices (#C, 3), faces
+        *,
+        like: LikeCage | None = None,
+        arrangement: ArrayLike | None = None,  # of the report of an earlier cage that was like another one
     ) -> CagingJob: ...
     @property
     def arcs(self) -> list[Arc]: ...  # the skeleton as it is used: clipped, recentred, pruned

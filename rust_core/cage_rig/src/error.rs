@@ -245,6 +245,14 @@ pub enum CagingError {
     Stuck { node: usize, place: Point },
     #[error("the cage was refused by the final check near control node {node} at {}: {fault}; a bending node is needed there", at(.place))]
     NotValid { node: usize, place: Point, fault: &'static str },
+    #[error("the cage to be like has no cross sections that its faces join")]
+    NoSections,
+    #[error("the cage to be like has {wanted} corners in a cross section, not {found}")]
+    OtherCorners { wanted: usize, found: usize },
+    #[error("nothing here is like the part of the other cage at its cross section {section}")]
+    Unlike { section: usize },
+    #[error("the other cage has {wanted} cross sections from number {section} on, with these nodes there are {found}")]
+    OtherNodes { section: usize, wanted: usize, found: usize },
     #[error("option {name} is {value}; it must be between {low} and {high}")]
     Option { name: &'static str, value: f64, low: f64, high: f64 },
     #[error(transparent)]
@@ -258,6 +266,14 @@ impl CagingError {
             self,
             Self::NoStart { .. } | Self::Stuck { .. } | Self::NotValid { .. } | Self::NoSection { .. }
         )
+    }
+
+    /// The section of a cage to be like that has no counterpart.
+    pub fn section(&self) -> Option<usize> {
+        match self {
+            Self::Unlike { section } | Self::OtherNodes { section, .. } => Some(*section),
+            _ => None,
+        }
     }
 
     /// Where it is: the control or skeleton node, if one is meant, and a point in the skin's space.

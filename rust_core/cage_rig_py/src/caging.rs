@@ -4,7 +4,8 @@ use crate::arrays;
 use crate::errors::{cancelled, CageRigError, OrRaise};
 use crate::jobs::Job;
 use cage_rig::caging::{
-    CageReport, CagingOptions, Earlier, GeneratedCage, Generator, NodeKind, Placement, Repairs, SectionReport,
+    CageReport, CagingOptions, Earlier, GeneratedCage, Generator, NodeKind, Placement, Repairs,
+    SectionReport, Template,
 };
 use cage_rig::{CagingError, Error, Point, Polygons, Progress};
 use numpy::{PyArray1, PyArrayMethods};
@@ -44,6 +45,14 @@ impl Input {
     }
 }
 
+/// Vertices, faces, and vertices of a cross section.
+type LikeCage<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, usize);
+
+fn template((vertices, faces, corners): LikeCage<'_>) -> PyResult<Template> {
+    let vertices = arrays::points(&vertices, "vertices to be like", ("#C", None))?;
+    Ok(Template { vertices, faces: arrays::polygons(&faces, "faces to be like")?, corners })
+}
+
 fn bending_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<Point>>> {
     given.map(|b| arrays::points(b, "bending_nodes", ("#B", None))).transpose()
 }
@@ -69,7 +78,8 @@ impl CagingJob {
 #[pymethods]
 impl CagingJob {
     #[new]
-    #[pyo3(signature = (vertices, faces, nodes, edges, *, bending_nodes=None, options=None))]
+    #[pyo3(signature = (vertices, faces, nodes, edges, *, bending_nodes=None, options=None, like=None))]
+    #[allow(clippy::too_many_arguments)] // the names are keywords in Python
     fn new(
         vertices: &Bound<'_, PyAny>,
         faces: &Bound<'_, PyAny>,
@@ -77,10 +87,18 @@ impl CagingJob {
         edges: &Bound<'_, PyAny>,
         bending_nodes: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
+        like: Option<LikeCage<'_>>,
     ) -> PyResult<Self> {
         let input = Input::read([vertices, faces], [nodes, edges], options)?;
         let bending = bending_points(bending_nodes)?;
-        Self::start(move |progress| input.generator()?.generate(bending.as_deref(), None, &progress.whole()))
+        let like = like.map(template).transpose()?;
+        Self::start(move |progress| {
+            let (generator, part) = (input.generator()?, progress.whole());
+            match &like {
+                Some(template) => generator.generate_like(bending.as_deref(), template, None, &part),
+                None => generator.generate(bending.as_deref(), None, &part),
+            }
+        })
     }
 
     /// How much is done, 0 to 1. Never falls.
@@ -145,16 +163,24 @@ impl CageGenerator {
         Ok(Self(Arc::new(py.detach(|| input.generator()).or_raise()?)))
     }
 
-    /// As cage_sections.
-    #[pyo3(signature = (bending_nodes=None))]
+    /// As cage_sections; those of a cage `like` another one, as in generate_cage.
+    #[pyo3(signature = (bending_nodes=None, *, like=None))]
     fn sections<'py>(
         &self,
         py: Python<'py>,
         bending_nodes: Option<&Bound<'py, PyAny>>,
+        like: Option<LikeCage<'py>>,
     ) -> PyResult<Bound<'py, PyList>> {
         let bending = bending_points(bending_nodes)?;
-        let found =
-            py.detach(|| self.0.sections(bending.as_deref(), &Progress::default().whole())).or_raise()?;
+        let like = like.map(template).transpose()?;
+        let found = py.detach(|| {
+            let (bending, progress) = (bending.as_deref(), Progress::default());
+            match &like {
+                Some(template) => self.0.preview_like(bending, template, &progress.whole()),
+                None => self.0.sections(bending, &progress.whole()),
+            }
+        });
+        let found = found.or_raise()?;
         section_list(py, &found)
     }
 
@@ -180,31 +206,41 @@ impl CageGenerator {
 
     /// Begins the cage in a thread of its own. `earlier`: bending nodes (or None), vertices (#C, 3) and
     /// faces of a cage of the same skin, skeleton and options; what it has around nodes that are still
-    /// there stays.
-    #[pyo3(signature = (bending_nodes=None, earlier=None))]
+    /// there stays. `like` as in generate_cage; `arrangement`: of the report of an earlier cage that was like
+    /// another one.
+    #[pyo3(signature = (bending_nodes=None, earlier=None, *, like=None, arrangement=None))]
     fn generate(
         &self,
         bending_nodes: Option<&Bound<'_, PyAny>>,
         earlier: Option<EarlierCage<'_>>,
+        like: Option<LikeCage<'_>>,
+        arrangement: Option<Vec<i64>>,
     ) -> PyResult<CagingJob> {
         let bending = bending_points(bending_nodes)?;
         let read = |(bending, vertices, faces): EarlierCage<'_>| -> PyResult<Earlier> {
             let vertices = arrays::points(&vertices, "earlier vertices", ("#C", None))?;
             let faces = arrays::polygons(&faces, "earlier faces")?;
-            Ok(Earlier { bending: bending_points(bending.as_ref())?, vertices, faces })
+            let bending = bending_points(bending.as_ref())?;
+            Ok(Earlier { bending, vertices, faces, arrangement: arrangement.clone() })
         };
         let earlier = earlier.map(read).transpose()?;
         let generator = Arc::clone(&self.0);
-        CagingJob::start(move |progress| {
-            generator.generate(bending.as_deref(), earlier.as_ref(), &progress.whole())
+        let like = like.map(template).transpose()?;
+        CagingJob::start(move |progress| match &like {
+            Some(template) => {
+                generator.generate_like(bending.as_deref(), template, earlier.as_ref(), &progress.whole())
+            }
+            None => generator.generate(bending.as_deref(), earlier.as_ref(), &progress.whole()),
         })
     }
 }
 
 /// Builds a cage around a closed skin (vertices (#V, 3), faces) from its skeleton (nodes (#N, 3),
-/// edges (#E, 2)). Returns its vertices, its faces (corner indices, face sizes), and a report.
+/// edges (#E, 2)). Returns its vertices, its faces (corner indices, face sizes), and a report. `like`:
+/// vertices (#C, 3), faces, and vertices of a cross section of a generated cage whose faces it takes over,
+/// index for index.
 #[pyfunction]
-#[pyo3(signature = (vertices, faces, nodes, edges, *, bending_nodes=None, options=None, progress=None))]
+#[pyo3(signature = (vertices, faces, nodes, edges, *, bending_nodes=None, options=None, like=None, progress=None))]
 #[allow(clippy::too_many_arguments)] // the names are keywords in Python
 fn generate_cage<'py>(
     py: Python<'py>,
@@ -214,9 +250,10 @@ fn generate_cage<'py>(
     edges: &Bound<'py, PyAny>,
     bending_nodes: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
+    like: Option<LikeCage<'py>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let job = CagingJob::new(vertices, faces, nodes, edges, bending_nodes, options)?;
+    let job = CagingJob::new(vertices, faces, nodes, edges, bending_nodes, options, like)?;
     let mut told = None;
     while !job.wait(py, progress.map(|_| TELLING))? {
         let Some(call) = progress else { continue };
@@ -256,7 +293,7 @@ fn cage_sections<'py>(
     bending_nodes: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyList>> {
-    CageGenerator::new(py, vertices, faces, nodes, edges, options)?.sections(py, bending_nodes)
+    CageGenerator::new(py, vertices, faces, nodes, edges, options)?.sections(py, bending_nodes, None)
 }
 
 /// A curve skeleton for a closed skin that has none: its nodes (#N, 3) and edges (#E, 2).
@@ -308,6 +345,8 @@ fn report_dict<'py>(py: Python<'py>, report: &CageReport) -> PyResult<Bound<'py,
     found.set_item("clearance", report.clearance)?;
     found.set_item("min_angle", report.min_angle)?;
     found.set_item("genus", report.genus)?;
+    let arrangement = report.arrangement.as_ref().map(|arcs| PyArray1::from_slice(py, arcs));
+    found.set_item("arrangement", arrangement)?;
     let mirror = report.mirror.as_ref().map(|m| PyArray1::from_iter(py, m.iter().map(|v| i64::from(*v))));
     found.set_item("mirror", mirror)?;
     let timings = PyDict::new(py);

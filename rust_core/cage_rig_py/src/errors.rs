@@ -20,7 +20,7 @@ create_exception!(
     cage_rig_core,
     CagingError,
     CageRigError,
-    "No cage was generated; `node` and `place` say where the fault is, or are None."
+    "No cage was generated; `node` and `place` say where the fault is, `section` which one of a cage to be like, or are None."
 );
 create_exception!(
     cage_rig_core,
@@ -54,6 +54,7 @@ fn caging_error(fault: &cage_rig::CagingError, message: String) -> PyErr {
     let named = Python::attach(|py| {
         let value = raised.value(py);
         value.setattr("node", node)?;
+        value.setattr("section", fault.section())?;
         value.setattr("cancelled", matches!(fault, cage_rig::CagingError::Cancelled(_)))?;
         value.setattr("place", place.map(|p| (p.x, p.y, p.z)))
     });

@@ -30,6 +30,8 @@ pub(crate) struct Body {
     owns: Vec<([bool; 3], [bool; 3])>,
     /// Triangles that never move: gaps between two of them are of no interest.
     still: Vec<bool>,
+    /// Sides that cross: the two diagonals of a quad.
+    crossed: HashSet<[u32; 4]>,
 }
 
 impl Body {
@@ -42,13 +44,35 @@ impl Body {
                 (own, [0, 1, 2].map(|k| sides.insert((t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])))))
             })
             .collect();
-        Self { tree: Bvh::new(points, triangles), owns, still: vec![false; triangles.len()] }
+        Self {
+            tree: Bvh::new(points, triangles),
+            owns,
+            still: vec![false; triangles.len()],
+            crossed: HashSet::new(),
+        }
+    }
+
+    /// Triangles, and quads split both ways.
+    pub(crate) fn with_quads(points: &[Point], triangles: &[[u32; 3]], quads: &[[u32; 4]]) -> Self {
+        let mut found = Self::new(points, &[triangles, &split_otherwise(quads)[..]].concat());
+        let crossing = |[a, b, c, d]: &[u32; 4]| {
+            let (p, q) = ([*a.min(c), *a.max(c)], [*b.min(d), *b.max(d)]);
+            let (p, q) = (p.min(q), p.max(q));
+            [p[0], p[1], q[0], q[1]]
+        };
+        found.crossed = quads.iter().map(crossing).collect();
+        found
     }
 
     /// Triangles with no corner that moves are still from now on.
     pub(crate) fn hold(&mut self, moves: impl Fn(u32) -> bool) {
         self.still = self.tree.triangles().iter().map(|t| !t.iter().any(|v| moves(*v))).collect();
     }
+}
+
+/// Quads that are fans of their first corners, split by the other diagonal.
+pub(crate) fn split_otherwise(quads: &[[u32; 4]]) -> Vec<[u32; 3]> {
+    quads.iter().flat_map(|[a, b, c, d]| [[*b, *c, *d], [*b, *d, *a]]).collect()
 }
 
 /// The points of both bodies, as contacts count them.
@@ -168,8 +192,10 @@ fn with_itself(at: usize, cage: &Body, points: &Points, reach: f64, found: &mut 
             }
             for m in 0..3 {
                 let (p, q) = ([a[k], a[(k + 1) % 3]], [b[m], b[(m + 1) % 3]]);
-                let ordered = (p[0].min(p[1]), p[0].max(p[1])) < (q[0].min(q[1]), q[0].max(q[1]));
-                if own_sides[k] && sides[m] && ordered && !p.contains(&q[0]) && !p.contains(&q[1]) {
+                let [low, high] = [p, q].map(|e| (e[0].min(e[1]), e[0].max(e[1])));
+                let apart = !p.contains(&q[0]) && !p.contains(&q[1]);
+                let apart = apart && !cage.crossed.contains(&[low.0, low.1, high.0, high.1]);
+                if own_sides[k] && sides[m] && low < high && apart {
                     add(Gap::EdgeEdge, [p[0], p[1], q[0], q[1]]);
                 }
             }

@@ -26,7 +26,18 @@ const SPLITS: usize = 12;
 /// Edges end shorter than this part of the lines of the graph that they are on.
 const SHORT: f64 = 0.25;
 /// Distances of the contracted skin from the axis: of those at rest, and at most of the cage's rings.
-const THREADS: [(f64, f64); 3] = [(0.03, 0.25), (0.01, 0.05), (0.002, 0.01)];
+pub(crate) const THREADS: [(f64, f64); 3] = [(0.03, 0.25), (0.01, 0.05), (0.002, 0.01)];
+/// The same in a cage that is as large as it will be.
+pub(crate) const IN_PLACE: [(f64, f64); 8] = [
+    (0.95, f64::INFINITY),
+    (0.85, f64::INFINITY),
+    (0.7, f64::INFINITY),
+    (0.5, f64::INFINITY),
+    (0.3, 1.0),
+    (0.1, 0.5),
+    (0.03, 0.25),
+    (0.01, 0.05),
+];
 
 /// Where inflation starts. Unit space.
 pub(crate) struct Start {
@@ -38,19 +49,27 @@ pub(crate) struct Start {
 }
 
 /// Contracts `obstacle` into the start of `scaffold`; else a cage vertex at the fault.
-pub(crate) fn start(scaffold: &Scaffold, sections: &[Section], obstacle: &Mesh) -> Result<Start, usize> {
+///
+/// `threads`: how far from the axis it may be, the widest first. `others`: triangles that quads of the cage may
+/// also be split into.
+pub(crate) fn start(
+    scaffold: &Scaffold,
+    sections: &[Section],
+    obstacle: &Mesh,
+    (threads, others): (&[(f64, f64)], &[[u32; 3]]),
+) -> Result<Start, usize> {
     let faces = scaffold.triangles();
     let cage = scaffold.start.clone();
     if let Some(vertex) = verify::first_self_crossing(&cage, &faces) {
         return Err(vertex as usize);
     }
-    let tree = Bvh::new(&cage, &faces);
+    let (tree, folded) = (Bvh::new(&cage, &faces), Bvh::new(&cage, others));
     let mut map = Map::new(scaffold, sections, obstacle.clone());
     map.split();
     map.draw_in();
     let places: Vec<Point> = map.at.iter().map(|s| map.graph.points[*s as usize]).collect();
     let mut fault = 0;
-    for (part, of_ring) in THREADS {
+    for &(part, of_ring) in threads {
         let thread: Vec<Point> = (0..places.len())
             .map(|v| {
                 let out = map.mesh.points[v] - places[v];
@@ -59,7 +78,10 @@ pub(crate) fn start(scaffold: &Scaffold, sections: &[Section], obstacle: &Mesh) 
             })
             .collect();
         match verify::first_outside(&tree, &cage, &thread, &map.mesh.triangles) {
-            None => return Ok(Start { cage, rest: map.mesh, obstacle: thread }),
+            None if verify::crossing(&folded, &cage, &thread, &map.mesh.triangles).is_empty() => {
+                return Ok(Start { cage, rest: map.mesh, obstacle: thread });
+            }
+            None => {}
             Some(vertex) => fault = vertex as usize,
         }
     }
@@ -259,7 +281,7 @@ mod tests {
         let small = Rings::Regular(0.1).corners(&nodes, &found);
         let built = scaffold(&skeleton, &nodes, &found, small).expect("no branches");
         let mesh = Mesh { points: skin.points.clone(), triangles: skin.triangles.clone() };
-        let begun = start(&built, &found, &mesh).expect("a start");
+        let begun = start(&built, &found, &mesh, (&THREADS, &[])).expect("a start");
         assert!(begun.rest.triangles.len() > mesh.triangles.len());
         let tree = Bvh::new(&begun.cage, &built.triangles());
         assert_eq!(verify::first_outside(&tree, &begun.cage, &begun.obstacle, &begun.rest.triangles), None);

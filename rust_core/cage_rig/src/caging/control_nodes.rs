@@ -77,14 +77,26 @@ pub(crate) fn control_nodes(
             }
         }
     }
+    if bending.is_none() {
+        for (at, arc) in skeleton.arcs.iter().enumerate() {
+            given[at] = placed(skin, skeleton, at, placement);
+            if skin.symmetric {
+                given[at] = even(arc, std::mem::take(&mut given[at]));
+            }
+        }
+    }
+    on_arcs(skin, skeleton, given)
+}
+
+/// Control nodes at places along each arc, and at leaves.
+pub(crate) fn on_arcs(
+    skin: &Skin,
+    skeleton: &CurveSkeleton,
+    places: Vec<Vec<f64>>,
+) -> Result<Vec<ControlNode>, CagingError> {
     let mut nodes = Vec::new();
-    for (at, arc) in skeleton.arcs.iter().enumerate() {
+    for (at, (arc, mut places)) in skeleton.arcs.iter().zip(places).enumerate() {
         let leaf = arc.ends.map(|e| skeleton.junctions[e].degree == 1);
-        let mut places = match bending {
-            Some(_) => given[at].clone(),
-            None if skin.symmetric => even(arc, placed(skin, skeleton, at, placement)),
-            None => placed(skin, skeleton, at, placement),
-        };
         places.sort_by(f64::total_cmp);
         if places.is_empty() && !leaf[0] && !leaf[1] {
             places.push(arc.length() * 0.5);

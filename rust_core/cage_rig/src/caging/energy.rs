@@ -41,6 +41,8 @@ const TINY: f64 = 0.1;
 /// The cage's connectivity and rest shape.
 pub(crate) struct Shape<'a> {
     pub(crate) faces: &'a [[u32; 3]],
+    /// Triangles that quads may also be split into.
+    pub(crate) others: &'a [[u32; 3]],
     pub(crate) edges: &'a [(u32, u32)],
     pub(crate) rest: &'a [Point],
     /// For each vertex its mirror image, x to −x.
@@ -68,6 +70,12 @@ impl Station {
 }
 
 impl Shape<'_> {
+    /// All triangles, each with the pressure on it.
+    fn triangles(&self, w: &Weights) -> impl Iterator<Item = (&[u32; 3], f64)> {
+        let (pressure, others) = (w.volume, self.others.iter().map(|t| (t, 0.0)));
+        self.faces.iter().map(move |t| (t, pressure)).chain(others)
+    }
+
     /// The part of a field of vectors that is symmetric, and zero where nothing moves.
     fn project(&self, field: &mut [Point]) {
         symmetrise(field, self.mirror);
@@ -121,9 +129,9 @@ pub(crate) fn energy(shape: &Shape, points: &Points, contacts: &[Contact], w: &W
     for section in shape.sections {
         sum += 0.5 * w.slide * section.off(x).powi(2);
     }
-    for t in shape.faces {
+    for (t, pressure) in shape.triangles(w) {
         let [a, b, c] = t.map(|v| &x[v as usize]);
-        sum += w.volume * a.dot(&b.cross(c)) / 6.0;
+        sum += pressure * a.dot(&b.cross(c)) / 6.0;
         let (q, _) = quality([a, b, c]);
         if q < FLAT {
             sum += w.quality * (q.max(1e-12) / FLAT).ln().powi(2);
@@ -170,11 +178,11 @@ pub(crate) fn newton_step(shape: &Shape, points: &Points, contacts: &[Contact], 
             }
         }
     }
-    for t in shape.faces {
+    for (t, pressure) in shape.triangles(w) {
         let corners = t.map(|v| &x[v as usize]);
         for k in 0..3 {
             system.gradient[t[k] as usize] +=
-                corners[(k + 1) % 3].cross(corners[(k + 2) % 3]) * (w.volume / 6.0);
+                corners[(k + 1) % 3].cross(corners[(k + 2) % 3]) * (pressure / 6.0);
         }
         let (q, gradient) = quality(corners);
         if q < FLAT && q > 1e-12 {
@@ -353,8 +361,15 @@ mod tests {
         let cage: Vec<Point> = ring.map(|(y, z)| Point::new(0.1 * y, y, z)).to_vec();
         let along = Point::x();
         let sections = [Station { vertices: vec![0, 1, 2, 3], along, place: 0.5 }];
-        let shape =
-            Shape { faces: &[], edges: &[], rest: &cage, mirror: None, moves: &[], sections: &sections };
+        let shape = Shape {
+            faces: &[],
+            others: &[],
+            edges: &[],
+            rest: &cage,
+            mirror: None,
+            moves: &[],
+            sections: &sections,
+        };
         let w = Weights {
             shape: 0.0,
             anchor: 0.0,

@@ -110,6 +110,7 @@ impl Generator {
 }
 
 /// Seconds spent in each stage.
+#[derive(Clone)]
 pub(super) struct Clock {
     last: Instant,
     laps: Laps,

@@ -5,7 +5,7 @@
 //! Newton steps under a barrier. What presses it on the resting skin afterwards is in `tightening`. Cost:
 //! about a hundred steps, each linear in the gaps narrower than a few per cent of the size.
 
-use super::contacts::{contacts, narrower, Body, Contact, Points};
+use super::contacts::{contacts, narrower, split_otherwise, Body, Contact, Points};
 use super::contraction::Start;
 use super::energy::{energy, newton_step, stations, Shape, Station, Weights};
 use super::obstacle::{Mesh, StandIn};
@@ -58,6 +58,8 @@ const SLIDE: f64 = 0.1;
 pub(crate) struct Inflation<'a> {
     scaffold: &'a Scaffold,
     pub(super) faces: Vec<[u32; 3]>,
+    /// Triangles that quads may also be split into.
+    others: Vec<[u32; 3]>,
     edges: Vec<(u32, u32)>,
     mirror: Option<&'a [u32]>,
     /// Whether a vertex moves; empty: all do.
@@ -86,6 +88,7 @@ impl<'a> Inflation<'a> {
         Self {
             scaffold,
             faces,
+            others: Vec::new(),
             edges,
             mirror,
             moves: Vec::new(),
@@ -93,6 +96,13 @@ impl<'a> Inflation<'a> {
             cage,
             body,
         }
+    }
+
+    /// Quads stay free whichever way they are split.
+    pub(crate) fn keep_quads(mut self, quads: &[[u32; 4]]) -> Self {
+        self.body = Body::with_quads(&self.cage, &self.faces, quads);
+        self.others = split_otherwise(quads);
+        self
     }
 
     /// Only these vertices move from now on.
@@ -281,7 +291,7 @@ impl<'a> Inflation<'a> {
     pub(crate) fn least_angle(&self) -> f64 {
         let moves = |t: &&[u32; 3]| t.iter().any(|v| self.moves.get(*v as usize) != Some(&false));
         let angle = |t: &[u32; 3]| least_angle(t.map(|v| self.cage[v as usize]));
-        self.faces.iter().filter(moves).map(angle).fold(180.0, f64::min)
+        self.faces.iter().chain(&self.others).filter(moves).map(angle).fold(180.0, f64::min)
     }
 
     /// Some Newton steps toward `goal`, together no longer than `limit`. How far anything moved.
@@ -296,8 +306,8 @@ impl<'a> Inflation<'a> {
         let edges = std::mem::take(&mut self.edges);
         let sections = std::mem::take(&mut self.sections);
         let (mirror, moves) = (self.mirror, &self.moves);
-        let shape =
-            Shape { faces: &self.faces, edges: &edges, rest: goal, mirror, moves, sections: &sections };
+        let (faces, others) = (&self.faces[..], &self.others[..]);
+        let shape = Shape { faces, others, edges: &edges, rest: goal, mirror, moves, sections: &sections };
         let mut left = limit;
         for _ in 0..rounds {
             let points = Points { cage: &self.cage, obstacle };

@@ -6,10 +6,12 @@
 //! all the way and hands out nothing that the exact check in [`verify`] has not passed.
 //! Every stage but the last works in a space where the skin has size 1.
 
+mod alike;
 mod axis_samples;
 mod contacts;
 mod contraction;
 pub(crate) mod control_nodes;
+mod counterpart;
 mod energy;
 mod extraction;
 pub(crate) mod field;
@@ -25,6 +27,7 @@ mod sections;
 pub(crate) mod skeleton;
 mod skin;
 mod symmetry;
+mod template;
 mod tightening;
 mod tips;
 mod transplant;
@@ -39,12 +42,13 @@ pub use regrowth::Earlier;
 pub use report::{ArcReport, CageReport, Laps, SectionReport};
 pub use sections::SectionOptions;
 pub use skin::{Repairs, Skin};
+pub use template::Template;
 
 use crate::error::CagingError;
 use crate::mesh::Polygons;
 use crate::points::Point;
 use crate::progress::{Cancelled, Part};
-use contraction::Start;
+use contraction::{Start, THREADS};
 use control_nodes::{control_nodes, ControlNode};
 use finishing::Clock;
 use inflation::Inflation;
@@ -307,18 +311,31 @@ impl Generator {
         clock.lap("obstacle");
         let (scaffold, start) = self.start(skeleton, (&nodes, &sections), &growth.mesh, &starting)?;
         clock.lap("contraction");
-        growing.begin("growing the cage")?;
         let plan = Plan { nodes, sections, scaffold, mirror, dropped: skeleton.dropped.clone() };
-        let mut inflation = Inflation::new(&plan.scaffold, plan.mirror.as_deref(), start.cage.clone());
+        Ok(self.grow((&plan, &[]), start, obstacles, (clock, [&growing, &finishing]))?)
+    }
+
+    /// From a start to the cage.
+    fn grow(
+        &self,
+        (plan, quads): (&Plan, &[[u32; 4]]),
+        start: Start,
+        obstacles: &Obstacles,
+        (mut clock, [growing, finishing]): (Clock, [&Part; 2]),
+    ) -> Result<GeneratedCage, CagingError> {
+        let growth = &obstacles.growth;
+        growing.begin("growing the cage")?;
+        let mut inflation =
+            Inflation::new(&plan.scaffold, plan.mirror.as_deref(), start.cage.clone()).keep_quads(quads);
         let options = &self.options.inflation;
-        let grown = inflation.grow(start, options, options.clearance + growth.margin, &growing)?;
+        let grown = inflation.grow(start, options, options.clearance + growth.margin, growing)?;
         if let Err(halt) = grown {
             let node = plan.nodes[plan.scaffold.owner[halt.vertex]].node;
             let place = self.skin.space.leave(&inflation.cage[halt.vertex]);
-            return Err(CagingError::Stuck { node, place }.into());
+            return Err(CagingError::Stuck { node, place });
         }
         clock.lap("growth");
-        Ok(self.finish(inflation, obstacles, &plan, &[], (clock, &finishing))?)
+        self.finish(inflation, obstacles, plan, &[], (clock, finishing))
     }
 
     /// The faces, and a start free of crossings: the largest rings that have one.
@@ -341,7 +358,7 @@ impl Generator {
                     continue;
                 }
             };
-            match contraction::start(&joined, sections, obstacle) {
+            match contraction::start(&joined, sections, obstacle, (&THREADS, &[])) {
                 Ok(start) => return Ok((joined, start)),
                 Err(vertex) => {
                     let at = joined.owner[vertex];

@@ -6,6 +6,7 @@
 //! Where that gives no good cage there is none, and the whole is grown. Linear in the sections but for
 //! the exact checks, and a tightening that looks at a part of the cage.
 
+use super::counterpart::rearranged;
 use super::energy::symmetrise_points;
 use super::finishing::Clock;
 use super::inflation::Inflation;
@@ -31,6 +32,8 @@ pub struct Earlier {
     pub vertices: Vec<Point>,
     /// Its faces.
     pub faces: Polygons,
+    /// As the report of a cage like another one has it.
+    pub arrangement: Option<Vec<i64>>,
 }
 
 /// How far new sections, and those next to a removed one, are widened for a start without crossings.
@@ -52,9 +55,15 @@ impl Generator {
         let mut clock = Clock::new();
         let [first, tracing, starting, finishing] = part.split([1.0, 1.0, 1.5, 2.0]);
         tracing.begin("cross sections")?;
-        let before = self.cross_sections(&self.skeleton, earlier.bending.as_deref(), &[], &first);
+        let arrangement = earlier.arrangement.as_deref();
+        let Some(skeleton) =
+            arrangement.map_or(Some(self.skeleton.clone()), |own| rearranged(&self.skeleton, own))
+        else {
+            return Ok(None);
+        };
+        let before = self.cross_sections(&skeleton, earlier.bending.as_deref(), &[], &first);
         let Some((before, _, _)) = unless_cancelled(before)? else { return Ok(None) };
-        let (nodes, sections, mirror) = self.cross_sections(&self.skeleton, bending, &[], &tracing)?;
+        let (nodes, sections, mirror) = self.cross_sections(&skeleton, bending, &[], &tracing)?;
         clock.lap("sections");
         starting.begin("what the edit leaves alone")?;
         let count = sections.first().map_or(0, |s| s.corners.len());
@@ -63,7 +72,7 @@ impl Generator {
         else {
             return Ok(None);
         };
-        let lineage = Lineage::new(&self.skeleton, &before, &nodes);
+        let lineage = Lineage::new(&skeleton, &before, &nodes);
         if lineage.is_unchanged() {
             return Ok(None);
         }
@@ -88,7 +97,8 @@ impl Generator {
         inflation.approach(&goal, fine, &self.options.inflation, &starting)?;
         clock.lap("approach");
         let found = self.finish(inflation, obstacles, &plan, &held, (clock, &finishing));
-        Ok(unless_cancelled(found)?.filter(|cage| cage.report.min_angle >= NARROW))
+        let found = unless_cancelled(found)?.filter(|cage| cage.report.min_angle >= NARROW);
+        Ok(found.map(|cage| cage.arranged(arrangement)))
     }
 
     /// The rings of an earlier cage with those that go on the straight way between their neighbours;
@@ -137,7 +147,7 @@ fn unless_cancelled<T>(found: Result<T, CagingError>) -> Result<Option<T>, Cagin
 }
 
 /// Faces one by one; `None` where they, or the vertices, can't be those of a cage.
-fn faces(polygons: &Polygons, vertices: &[Point]) -> Option<Vec<Vec<u32>>> {
+pub(super) fn faces(polygons: &Polygons, vertices: &[Point]) -> Option<Vec<Vec<u32>>> {
     let mut corners = polygons.corners.iter();
     let mut found = Vec::new();
     for size in &polygons.sizes {

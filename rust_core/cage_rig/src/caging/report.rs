@@ -67,6 +67,9 @@ pub struct CageReport {
     pub min_angle: f64,
     /// For each cage vertex its mirror image; none when the cage is not symmetric.
     pub mirror: Option<Vec<u32>>,
+    /// Of a cage like another one, whose arcs are in another order: for each the number of its own, from 1,
+    /// negative where it is turned.
+    pub arrangement: Option<Vec<i64>>,
     /// Loops of the cage.
     pub genus: i64,
     /// Seconds by stage.
@@ -125,6 +128,7 @@ pub(super) fn cage(
         mean_distance: mean_distance(skin, &unit, &faces),
         clearance: skin.points.par_iter().map(gap).reduce(|| f64::INFINITY, f64::min),
         min_angle: faces.iter().map(|t| least_angle(t.map(|v| unit[v as usize]))).fold(180.0, f64::min),
+        arrangement: None,
         genus: 1 - (vertices.len() as i64 - edges.len() as i64 + faces.len() as i64) / 2,
         mirror: mirror.clone(),
         timings,

@@ -123,15 +123,24 @@ pub(crate) fn section(
     if ring.len() < SEEDS / 2 {
         return None;
     }
-    let mut corners = corners(&ring, &node.direction, options.corners);
-    let center = corners.iter().sum::<Point>() / corners.len() as f64;
-    if node.kind == NodeKind::Leaf {
-        // Field lines close to a blunt end meet in its middle; the cage wants its width.
-        let width = corners.iter().map(|p| (p - center).norm()).sum::<f64>() / corners.len() as f64;
-        let scale = (BLUNT * node.radius / width.max(1e-300)).clamp(1.0, 5.0);
-        corners.iter_mut().for_each(|p| *p = center + (*p - center) * scale);
+    let corners = corners(&ring, &node.direction, options.corners);
+    let mut found = Section { ring, corners, center: Point::zeros() };
+    found.widen(node);
+    Some(found)
+}
+
+impl Section {
+    /// Its middle from its corners. Field lines close to a blunt end meet in its middle; the cage wants its
+    /// width.
+    pub(super) fn widen(&mut self, node: &ControlNode) {
+        let Self { corners, center, .. } = self;
+        *center = corners.iter().sum::<Point>() / corners.len() as f64;
+        if node.kind == NodeKind::Leaf {
+            let width = corners.iter().map(|p| (p - *center).norm()).sum::<f64>() / corners.len() as f64;
+            let scale = (BLUNT * node.radius / width.max(1e-300)).clamp(1.0, 5.0);
+            corners.iter_mut().for_each(|p| *p = *center + (*p - *center) * scale);
+        }
     }
-    Some(Section { ring, corners, center })
 }
 
 /// Two axes at right angles to `direction` and each other, counterclockwise.
@@ -191,11 +200,21 @@ fn corners(ring: &[Point], direction: &Point, count: usize) -> Vec<Point> {
         })
         .collect();
     let score = |aim: usize, at: usize| aims[aim][0] * flat[at][0] + aims[aim][1] * flat[at][1];
+    best(ring, count, &score)
+}
+
+/// The ring points nearest to `targets`, in their order around the ring.
+pub(super) fn toward(ring: &[Point], targets: &[Point]) -> Vec<Point> {
+    best(ring, targets.len(), &|aim: usize, at: usize| -(ring[at] - targets[aim]).norm_squared())
+}
+
+/// Distinct points of the ring in cyclic order, one for each aim.
+fn best(ring: &[Point], count: usize, score: &impl Fn(usize, usize) -> f64) -> Vec<Point> {
     // The best increasing choice with gaps of two, from each possible first ring point.
     let (n, gap) = (ring.len(), (ring.len() / (3 * count)).max(1));
     let mut best = (f64::NEG_INFINITY, Vec::new());
     for first in 0..n {
-        let (value, chosen) = choose(first, n, gap, count, &score);
+        let (value, chosen) = choose(first, n, gap, count, score);
         if value > best.0 {
             best = (value, chosen);
         }

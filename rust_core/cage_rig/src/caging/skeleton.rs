@@ -94,7 +94,7 @@ impl Arc {
     }
 
     /// The other way round.
-    fn turn(&mut self) {
+    pub(super) fn turn(&mut self) {
         let length = self.length();
         self.ends.reverse();
         self.path.reverse();

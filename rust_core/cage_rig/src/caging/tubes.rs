@@ -238,7 +238,7 @@ impl Scaffold {
     }
 
     /// Leaf ends of the axis, drawn back from their caps.
-    fn pull_leaves(&mut self, nodes: &[ControlNode]) {
+    pub(super) fn pull_leaves(&mut self, nodes: &[ControlNode]) {
         for (at, node) in nodes.iter().enumerate() {
             let mut near = self.axis.edges.iter().filter(|(a, b)| *a == at || *b == at);
             if let (NodeKind::Leaf, Some(&(a, b)), None) = (node.kind, near.next(), near.next()) {
