@@ -15,15 +15,19 @@ _LEG = ((0.0, 0.0, 0.14), (0.20, -0.02, -0.34), (0.24, 0.02, -0.80))
 _SPINE = ((0.0, 0.0, 0.14), (0.0, 0.0, 0.72), (0.0, -0.02, 1.10))
 
 
-def doll(*, cell: float = 0.06, legs_first: bool = False) -> Character:
+_TAIL = ((0.0, 0.02, 0.45), (0.0, 0.30, 0.50))
+
+
+def doll(*, cell: float = 0.06, legs_first: bool = False, tail: bool = False) -> Character:
     """The doll in triangles of about `cell` metres; `legs_first`: with its bones in another order."""
     arm = chain(((0.15, 0.0, 0.71), *_ARM[1:]), (0.12, 0.10, 0.08), 0.02)
     leg = chain(((0.10, 0.0, 0.05), *_LEG[1:]), (0.16, 0.12, 0.09), 0.02)
     trunk = chain((*_SPINE[:2], (0.0, 0.0, 0.86)), (0.22, 0.20, 0.10), 0.05)
     head = chain(((0.0, -0.02, 1.0), (0.0, -0.02, 1.08)), (0.17, 0.17), 0.02)
-    field = union([trunk, head, mirrored(arm), mirrored(leg)], 0.06)
-    vertices, faces = mesh_field(field, (-1.0, -0.35, -1.0), (1.0, 0.35, 1.35), cell=cell)
-    bones = _bones(legs_first)
+    more = [chain(_TAIL, (0.08, 0.07))] if tail else []
+    field = union([trunk, head, mirrored(arm), mirrored(leg), *more], 0.06)
+    vertices, faces = mesh_field(field, (-1.0, -0.45, -1.0), (1.0, 0.45, 1.35), cell=cell)
+    bones = [*_bones(legs_first), *([Bone("tail", *_TAIL, "spine")] if tail else [])]
     part = Part("doll", symmetrise(vertices), faces, "Doll", tuple(bone.name for bone in bones))
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     skin = Skin("Doll", part.vertices, triangles, part_weights(part, bones))

@@ -62,6 +62,27 @@ def test_options_say_how_it_is_made(main: Main, hero: Path, tmp_path: Path) -> N
     assert kept.clearance == pytest.approx(0.01)
 
 
+def test_a_cage_of_the_file_can_be_what_it_is_like(
+    main: Main, hero: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    _, first = main("generate-cage", hero, "--out", tmp_path / "caged.blend", "--placement", "joints", "--corners", "6")
+    bpy.ops.wm.open_mainfile(filepath=first["out"])
+    model = bpy.data.objects[first["cage"]]
+    faces = [tuple(face.vertices) for face in model.data.polygons]
+    twice = save(tmp_path / "twice.blend")
+    given = ("generate-cage", twice, "--out", tmp_path / "like.blend", "--like")
+    code, answer = main(*given, model.name)
+    assert code == 0 and f"with the faces of '{first['cage']}'" in answer["summary"]
+    bpy.ops.wm.open_mainfile(filepath=answer["out"])
+    cage = bpy.data.objects[answer["cage"]]
+    assert cage.name != first["cage"]
+    assert [tuple(face.vertices) for face in cage.data.polygons] == faces
+    code, _ = main(*given, "Capsule")
+    assert code == 2 and "is no cage that Generate Cage made" in capfd.readouterr().err
+    code, _ = main(*given, first["cage"], "--corners", "4")
+    assert code == 2 and "has 6 corners in a cross section, not 4; set Corners to 6" in capfd.readouterr().err
+
+
 def test_it_equals_what_the_script_makes(main: Main, hero: Path, tmp_path: Path) -> None:
     import bl_ext.user_default.cage_rig.caging as caging
 

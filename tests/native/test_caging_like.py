@@ -8,7 +8,7 @@ from test_caging_characters import load
 
 from blend_fixtures.doll import doll
 
-HUMANS = ("human_2k_53b", "human_24k_52b", "human_200k_53b")
+HUMANS = ("human_2k_53b", "human_24k_52b", "human_200k_53b", "human_24k_163b")
 
 
 def arrays(**how):
@@ -103,6 +103,21 @@ def test_the_other_cage_may_be_elsewhere_and_of_another_size(fine, generator, te
     check(*fine[:2], cage, found, report)
 
 
+def test_a_limb_that_the_other_lacks_gets_no_branch(template):
+    """A tail, and a spine that it cuts in two."""
+    skin, faces, nodes, edges = arrays(cell=0.05, tail=True)
+    root, middle, top = (
+        int(np.abs(nodes - [0, y, z]).sum(axis=1).argmin()) for y, z in ((0, 0.14), (0.02, 0.45), (0, 0.72))
+    )
+    edges = [edge for edge in edges.tolist() if set(edge) != {root, top}] + [[root, middle], [middle, top]]
+    generator = core.CageGenerator(skin, faces, nodes, np.array(edges))
+    assert len(generator.arcs) == 8
+    cage, found, report = generator.generate(like=template).result()
+    assert same(found, template[1])
+    check(skin, faces, cage, found, report)
+    assert len(report["dropped_nodes"]) == 1
+
+
 def test_sections_are_those_of_the_other_cage(generator, template, alike):
     sections = generator.sections(like=template)
     middles = template[0].reshape(-1, 4, 3).mean(axis=1)
@@ -170,8 +185,9 @@ def test_it_can_be_cancelled(generator, template):
         job.result()
 
 
-@pytest.mark.parametrize(("one", "other"), [(0, 1), (1, 0)])
+@pytest.mark.parametrize(("one", "other"), [(0, 1), (1, 0), (1, 3)])
 def test_humans_have_the_same_faces(one, other):
+    """Also where a rig has two branchings in each palm instead of one."""
     vertices, faces, before = core.generate_cage(*load(HUMANS[one]))
     skin = load(HUMANS[other])
     cage, found, report = core.generate_cage(*skin, like=(vertices, faces, 4))

@@ -8,7 +8,7 @@
 use super::contacts::split_otherwise;
 use super::contraction::{self, Start, IN_PLACE, THREADS};
 use super::control_nodes::{control_nodes, on_arcs, ControlNode, NodeKind};
-use super::counterpart::{as_before, counterparts, rearranged, Arrangement, Match};
+use super::counterpart::{as_before, contracted, counterparts, rearranged, Arrangement, Match};
 use super::energy::symmetrise;
 use super::finishing::Clock;
 use super::obstacle::Obstacles;
@@ -20,6 +20,7 @@ use super::skeleton::{curve_skeleton, Arc, CurveSkeleton};
 use super::symmetry;
 use super::template::{center, Chain, End, Pattern, Template};
 use super::tubes::{Axis, Scaffold};
+use super::turning::NARROW;
 use super::verify::{self, Fault};
 use super::{CrossSections, GeneratedCage, Generator, Plan};
 use crate::error::CagingError;
@@ -61,9 +62,11 @@ impl Generator {
         let obstacles = self.obstacles.get_or_init(|| Obstacles::of(&self.skin));
         clock.lap("obstacle");
         let mut refused = CagingError::TooFewSections { sections: nodes.len() };
+        let mut best: Option<GeneratedCage> = None;
         for in_place in [true, false] {
-            let grown = self.begin(in_place, (&skeleton, &pattern), (&nodes, &sections), obstacles).and_then(
-                |(scaffold, start)| {
+            let grown = self
+                .begin(in_place, (&skeleton, &pattern), (&nodes, &sections, mirror.as_deref()), obstacles)
+                .and_then(|(scaffold, start)| {
                     clock.lap("contraction");
                     let (nodes, sections) = (nodes.clone(), sections.clone());
                     let dropped = skeleton.dropped.clone();
@@ -74,13 +77,18 @@ impl Generator {
                         obstacles,
                         (clock.clone(), [&growing, &finishing]),
                     )
-                },
-            );
+                });
             match grown {
                 Ok(mut cage) => match self.fault_of(&pattern, &cage.vertices) {
                     None => {
                         cage.faces = template.faces.clone();
-                        return Ok(cage.arranged(Some(&arrangement)));
+                        let angle = cage.report.min_angle;
+                        if best.as_ref().is_none_or(|other| other.report.min_angle < angle) {
+                            best = Some(cage.arranged(Some(&arrangement)));
+                        }
+                        if angle >= NARROW {
+                            break;
+                        }
                     }
                     Some(Fault { vertex, what }) => {
                         let node = nodes[vertex / pattern.count].node;
@@ -91,7 +99,7 @@ impl Generator {
                 Err(fault) => return Err(fault),
             }
         }
-        Err(refused)
+        best.ok_or(refused)
     }
 
     /// Control nodes and their sections for a cage like `template`.
@@ -133,11 +141,18 @@ impl Generator {
     fn matched(&self, pattern: &Pattern) -> Result<(CurveSkeleton, Arrangement, f64), CagingError> {
         let mut skeleton = self.skeleton.clone();
         let mut without = Vec::new();
+        let mut numbers: Arrangement = (1..=skeleton.arcs.len() as i64).collect();
         loop {
             match counterparts(&skeleton, pattern)? {
                 Match::All(found, apart) => {
                     let arranged = rearranged(&skeleton, &found).ok_or(CagingError::Unlike { section: 0 })?;
-                    return Ok((arranged, found, apart));
+                    let number = |arc: &i64| arc.signum() * numbers[arc.unsigned_abs() as usize - 1];
+                    return Ok((arranged, found.iter().map(number).collect(), apart));
+                }
+                Match::Short(arc) => {
+                    skeleton = contracted(skeleton, arc);
+                    numbers.remove(arc);
+                    continue;
                 }
                 Match::Left(tip, section) if without.contains(&tip) => {
                     return Err(CagingError::Unlike { section });
@@ -146,6 +161,7 @@ impl Generator {
             }
             let graph = &self.graph;
             skeleton = curve_skeleton(&self.skin, &graph.0, &graph.1, self.options.detail, &without)?;
+            numbers = (1..=skeleton.arcs.len() as i64).collect();
         }
     }
 
@@ -213,7 +229,7 @@ impl Generator {
         &self,
         in_place: bool,
         (skeleton, pattern): (&CurveSkeleton, &Pattern),
-        (nodes, sections): (&[ControlNode], &[Section]),
+        (nodes, sections, mirror): (&[ControlNode], &[Section], Option<&[u32]>),
         obstacles: &Obstacles,
     ) -> Result<(Scaffold, Start), CagingError> {
         let threads = if in_place { &IN_PLACE[..] } else { &THREADS };
@@ -225,7 +241,9 @@ impl Generator {
         };
         let others = split_otherwise(&pattern.quads());
         let mut fault = CagingError::TooFewSections { sections: nodes.len() };
-        for (corners, start) in starts {
+        for (mut corners, mut start) in starts {
+            symmetrise(&mut corners, mirror);
+            symmetrise(&mut start, mirror);
             let scaffold = scaffold((skeleton, pattern), nodes, corners, start);
             match contraction::start(&scaffold, sections, &obstacles.growth.mesh, (threads, &others)) {
                 Ok(start) => return Ok((scaffold, start)),

@@ -16,6 +16,8 @@ pub(crate) type Arrangement = Vec<i64>;
 
 /// No counterpart is farther away than this, relative to the size.
 const FAR: f64 = 0.2;
+/// No longer arc is given up to make two branching nodes one.
+const SHORT: f64 = 0.1;
 
 /// What a skeleton has for the chains of a template.
 pub(crate) enum Match {
@@ -23,6 +25,8 @@ pub(crate) enum Match {
     All(Arrangement, f64),
     /// The tip (a node of the input) of a leaf that the template lacks, and the section nearest to it.
     Left(usize, usize),
+    /// A short arc between two branching nodes that are one in the template.
+    Short(usize),
 }
 
 impl GeneratedCage {
@@ -59,6 +63,18 @@ pub(crate) fn rearranged(skeleton: &CurveSkeleton, arrangement: &[i64]) -> Optio
     (arcs.len() == skeleton.arcs.len()).then(|| CurveSkeleton { arcs, ..skeleton.clone() })
 }
 
+/// Without an arc: its ends are one branching node, half way between.
+pub(crate) fn contracted(mut skeleton: CurveSkeleton, arc: usize) -> CurveSkeleton {
+    let Arc { ends: [one, other], .. } = skeleton.arcs.remove(arc);
+    let [first, second] = [one, other].map(|end| skeleton.junctions[end].clone());
+    skeleton.junctions[one].point = (first.point + second.point) * 0.5;
+    skeleton.junctions[one].degree = (first.degree + second.degree).saturating_sub(2);
+    for end in skeleton.arcs.iter_mut().flat_map(|arc| &mut arc.ends).filter(|end| **end == other) {
+        *end = one;
+    }
+    skeleton
+}
+
 /// The arcs that take the place of the chains.
 pub(crate) fn counterparts(skeleton: &CurveSkeleton, pattern: &Pattern) -> Result<Match, CagingError> {
     let chains = &pattern.chains;
@@ -93,6 +109,12 @@ pub(crate) fn counterparts(skeleton: &CurveSkeleton, pattern: &Pattern) -> Resul
     };
     if let Some(left) = (0..taken.len()).filter(|a| !taken[*a]).find_map(tip) {
         return Ok(left);
+    }
+    let is_short = |a: &usize| !taken[*a] && skeleton.arcs[*a].length() < SHORT;
+    let of_branches = |a: &usize| skeleton.arcs[*a].ends[0] != skeleton.arcs[*a].ends[1];
+    let short = (0..taken.len()).filter(is_short).find(of_branches);
+    if let Some(short) = short.filter(|_| skeleton.arcs.len() > chains.len()) {
+        return Ok(Match::Short(short));
     }
     let lacks = |c: usize| CagingError::Unlike { section: pattern.chains[c].first };
     let mut found: Vec<(usize, bool)> = Vec::new();
@@ -157,4 +179,51 @@ fn to_line(p: &Point, line: &[Point]) -> f64 {
     };
     let own = line.first().map_or(f64::INFINITY, |q| (p - q).norm());
     line.windows(2).map(to_piece).fold(own, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A letter H: two arcs at each of two branching nodes, and a short one between these.
+    fn letter() -> CurveSkeleton {
+        let junction =
+            |x: f64, y: f64, degree| Junction { point: Point::new(x, y, 0.0), radius: 1.0, node: 0, degree };
+        let junctions = vec![
+            junction(0.0, 0.0, 3),
+            junction(0.05, 0.0, 3),
+            junction(0.0, 1.0, 1),
+            junction(0.0, -1.0, 1),
+            junction(0.05, 1.0, 1),
+            junction(0.05, -1.0, 1),
+        ];
+        let arc = |ends: [usize; 2]| {
+            let path: Vec<Point> = ends.map(|end| junctions[end].point).to_vec();
+            let along = vec![0.0, (path[1] - path[0]).norm()];
+            Arc { ends, path, along, radii: vec![1.0; 2], nodes: vec![None; 2] }
+        };
+        let arcs = [[0, 2], [3, 0], [0, 1], [1, 4], [1, 5]].map(arc).to_vec();
+        CurveSkeleton { junctions, arcs, dropped: Vec::new() }
+    }
+
+    #[test]
+    fn arcs_come_in_another_order_and_direction() {
+        let found = rearranged(&letter(), &[3, -2, 5, 4, -1]).expect("every arc once");
+        let ends: Vec<[usize; 2]> = found.arcs.iter().map(|arc| arc.ends).collect();
+        assert_eq!(ends, [[0, 1], [0, 3], [1, 5], [1, 4], [2, 0]]);
+        assert_eq!(found.arcs[1].path[0], letter().junctions[0].point);
+        for wrong in
+            [&[3, -2, 5, 4][..], &[3, 3, 5, 4, 1], &[3, -3, 5, 4, 1], &[6, 2, 5, 4, 1], &[0, 2, 5, 4, 1]]
+        {
+            assert!(rearranged(&letter(), wrong).is_none(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn two_branching_nodes_become_one() {
+        let found = contracted(letter(), 2);
+        assert_eq!(found.arcs.len(), 4);
+        assert!(found.arcs.iter().all(|arc| arc.ends.contains(&0)));
+        assert_eq!((found.junctions[0].degree, found.junctions[0].point.x), (4, 0.025));
+    }
 }

@@ -233,3 +233,47 @@ fn patches(faces: &[Vec<u32>], at_edge: &HashMap<(u32, u32), usize>, count: usiz
     }
     Some(patch)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tube of rings of three corners, closed by caps.
+    fn tube(rings: u32) -> (Vec<Point>, Vec<Vec<u32>>) {
+        let vertices = (0..3 * rings).map(|v| Point::new(f64::from(v / 3), f64::from(v % 3), 0.0)).collect();
+        let last = 3 * (rings - 1);
+        let mut faces = vec![vec![2, 1, 0], vec![last, last + 1, last + 2]];
+        for ring in 0..rings - 1 {
+            for k in 0..3 {
+                let (a, b) = (3 * ring + k, 3 * ring + (k + 1) % 3);
+                faces.push(vec![a, b, b + 3, a + 3]);
+            }
+        }
+        (vertices, faces)
+    }
+
+    #[test]
+    fn chains_are_read_off_the_faces() {
+        let (vertices, faces) = tube(4);
+        let found = Pattern::new(vertices.clone(), faces.clone(), 3).expect("a tube");
+        assert_eq!(found.chains, [Chain { first: 0, count: 4, ends: [End::Leaf, End::Leaf] }]);
+        assert_eq!(found.chains[0].bending(), 1..3);
+        assert!(found.branches.is_empty());
+        assert_eq!((found.quads().len(), found.triangles().len()), (9, 20));
+        assert!(Pattern::new(vertices.clone(), faces[1..].to_vec(), 3).is_none(), "open");
+        assert!(Pattern::new(vertices, faces, 2).is_none(), "rings of two have other sides");
+    }
+
+    #[test]
+    fn a_mirror_image_is_found_about_its_own_middle() {
+        let (mut vertices, faces) = tube(2);
+        vertices.iter_mut().for_each(|p| p.x += 7.0);
+        let mut found = Pattern::new(vertices, faces, 3).expect("a tube");
+        let mirror = found.mirror().expect("symmetric");
+        assert_eq!(mirror, [3, 4, 5, 0, 1, 2]);
+        found.even_out(&mirror);
+        assert!((found.vertices[0].x + 0.5).abs() < 1e-12 && (found.vertices[3].x - 0.5).abs() < 1e-12);
+        found.vertices[1].y += 0.01;
+        assert_eq!(found.mirror(), None);
+    }
+}
