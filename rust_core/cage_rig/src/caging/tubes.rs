@@ -185,13 +185,29 @@ impl Scaffold {
                 ring
             })
             .collect();
-        for center in middles(start, &sections) {
+        let mut between: Vec<(f64, Point)> =
+            between(start, &sections).into_iter().map(|p| (self.behind(&rings, &p), p)).collect();
+        between.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for center in on_way(start, &sections).into_iter().chain(between.into_iter().map(|(_, p)| p)) {
             if let Some(faces) = self.star(&center, &rings) {
                 self.polygons.extend(faces);
                 return Some(center);
             }
         }
         None
+    }
+
+    /// How far a place is behind the rings, at their start.
+    fn behind(&self, rings: &[Vec<u32>], place: &Point) -> f64 {
+        let of_ring = |ring: &Vec<u32>| {
+            let at = |k: usize| self.start[ring[k % ring.len()] as usize];
+            let of_corner = |k: usize| {
+                let across = (at(k + 1) - at(k)).cross(&(at(k + 2) - at(k + 1)));
+                across.try_normalize(1e-12).map_or(f64::NEG_INFINITY, |n| (at(k) - place).dot(&n))
+            };
+            (0..ring.len()).map(of_corner).fold(f64::INFINITY, f64::min)
+        };
+        rings.iter().map(of_ring).fold(f64::INFINITY, f64::min)
     }
 
     /// Faces between the rings that are star-shaped about `center` at the start.
@@ -250,23 +266,23 @@ impl Scaffold {
     }
 }
 
-/// Places for the middle of a branching node: on the way from where it is to the mean of its sections,
-/// then anywhere between these, the nearest first. Limbs that all lead to one side have none on the way.
-fn middles(start: &Point, sections: &[Point]) -> Vec<Point> {
+/// Places for the middle of a branching node on the way from where it is to the mean of its sections.
+fn on_way(start: &Point, sections: &[Point]) -> Vec<Point> {
     let mean = sections.iter().sum::<Point>() / sections.len() as f64;
-    let on_way = |blend: f64| start + (mean - start) * blend;
-    let mut found = [0.5, 0.25, 0.75, 0.0, 1.0].map(on_way).to_vec();
+    [0.5, 0.25, 0.75, 0.0, 1.0].map(|blend| start + (mean - start) * blend).to_vec()
+}
+
+/// And anywhere between these: limbs that all lead to one side have none on the way.
+fn between(start: &Point, sections: &[Point]) -> Vec<Point> {
     let among: Vec<Point> = sections.iter().chain([start]).copied().collect();
     let parts = if among.len() <= MANY { PARTS } else { PARTS / 2 };
     let place = |share: &Vec<usize>| -> Point {
         share.iter().zip(&among).map(|(k, p)| p * (*k as f64 / parts as f64)).sum()
     };
-    let mut between: Vec<Point> = shares(among.len(), parts).iter().map(place).collect();
-    if start.x.abs() < PLANE && mean.x.abs() < PLANE {
-        between.retain(|p| p.x.abs() < PLANE);
+    let mut found: Vec<Point> = shares(among.len(), parts).iter().map(place).collect();
+    if among.iter().sum::<Point>().x.abs() < PLANE && start.x.abs() < PLANE {
+        found.retain(|p| p.x.abs() < PLANE);
     }
-    between.sort_by(|p, q| (p - found[0]).norm().total_cmp(&(q - found[0]).norm()));
-    found.extend(between);
     found
 }
 
