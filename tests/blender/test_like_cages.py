@@ -116,6 +116,17 @@ def points(cage: bpy.types.Object) -> np.ndarray:
     return found.reshape(-1, 3)
 
 
+def test_nodes_to_be_edited_begin_where_the_other_cage_has_its_sections(
+    caging: ModuleType, like: bpy.types.Object, fine: uncaged.Uncaged
+) -> None:
+    skins, armature = fine
+    opened = caging.open_character(bpy.context, armature, skins, caging.Options(), like)
+    editing = caging.edit(opened, caging.Options(), None)
+    assert len(editing.sections) == len(set(sections(like))) > len(editing.places) > 3
+    cage = caging.generate_cage(bpy.context, *fine, like=like)
+    assert caging.nodes_of(cage) == [node._replace(position=pytest.approx(node.position)) for node in editing.nodes]
+
+
 def test_after_an_edit_of_its_nodes_it_still_is_like_the_other(
     caging: ModuleType, like: bpy.types.Object, fine: uncaged.Uncaged
 ) -> None:
