@@ -1,8 +1,9 @@
 //! Polygon meshes as they are handed in, and the triangles that stand for them.
 //!
-//! A polygon is always split the same way, wherever its corner list starts: quads by their valid
-//! or else shorter diagonal (equal ones: the diagonal with the smallest vertex), larger polygons
-//! by clipping ears in their best-fit plane. Cost: linear in corners, quadratic within a polygon.
+//! A polygon of what a bind computes is always split the same way, wherever its corner list starts: quads
+//! by their valid or else shorter diagonal (equal ones: the diagonal with the smallest vertex), larger
+//! polygons by clipping ears in their best-fit plane. A skin that is to be enclosed as it is seen has its
+//! quads split as Blender draws them. Cost: linear in corners, quadratic within a polygon.
 
 use crate::points::Point;
 
@@ -57,8 +58,26 @@ pub(crate) struct Piece {
     pub(crate) face: usize,
 }
 
+/// Which diagonal splits a quad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Diagonal {
+    /// The valid or else shorter one.
+    Shorter,
+    /// That of its first corner, but where the quad is folded there.
+    First,
+}
+
 /// Splits every face into triangles of the same orientation. `vertices`: `#V by 3`.
 pub(crate) fn triangulate(vertices: &[Point], faces: &Polygons) -> Result<Vec<Piece>, FaceFault> {
+    split(vertices, faces, Diagonal::Shorter)
+}
+
+/// The same with quads as Blender draws them.
+pub(crate) fn triangulate_as_drawn(vertices: &[Point], faces: &Polygons) -> Result<Vec<Piece>, FaceFault> {
+    split(vertices, faces, Diagonal::First)
+}
+
+fn split(vertices: &[Point], faces: &Polygons, diagonal: Diagonal) -> Result<Vec<Piece>, FaceFault> {
     let mut pieces = Vec::with_capacity(faces.corners.len().saturating_sub(2 * faces.len()));
     for (face, corners) in faces.iter().enumerate() {
         if corners.len() < 3 {
@@ -67,7 +86,9 @@ pub(crate) fn triangulate(vertices: &[Point], faces: &Polygons) -> Result<Vec<Pi
         if let Some(&vertex) = corners.iter().find(|&&v| v < 0 || v >= vertices.len() as i64) {
             return Err(FaceFault::BadIndex { face, vertex });
         }
-        let first = (0..corners.len()).min_by_key(|&i| corners[i]).unwrap_or(0);
+        let drawn = diagonal == Diagonal::First && corners.len() == 4;
+        let smallest = (0..corners.len()).min_by_key(|&i| corners[i]).unwrap_or(0);
+        let first = if drawn { 0 } else { smallest };
         let polygon: Vec<u32> =
             (0..corners.len()).map(|i| corners[(first + i) % corners.len()] as u32).collect();
         let mut add = |corners: [u32; 3]| pieces.push(Piece { corners, face });
@@ -75,7 +96,8 @@ pub(crate) fn triangulate(vertices: &[Point], faces: &Polygons) -> Result<Vec<Pi
             [a, b, c] => add([a, b, c]),
             [a, b, c, d] => {
                 let [p, q, r, s] = [a, b, c, d].map(|v| vertices[v as usize]);
-                if splits_at_first(p, q, r, s) {
+                let at_first = if drawn { !is_folded(p, q, r, s) } else { splits_at_first(p, q, r, s) };
+                if at_first {
                     [[a, b, c], [a, c, d]].into_iter().for_each(&mut add);
                 } else {
                     [[a, b, d], [b, c, d]].into_iter().for_each(&mut add);
@@ -97,6 +119,12 @@ fn splits_at_first(p: Point, q: Point, r: Point, s: Point) -> bool {
         return first;
     }
     (r - p).norm() <= (s - q).norm() * (1.0 + 1e-9)
+}
+
+/// Do the two triangles beside diagonal p–r of the quad p q r s face away from each other?
+fn is_folded(p: Point, q: Point, r: Point, s: Point) -> bool {
+    let diagonal = r - p;
+    (q - p).cross(&diagonal).dot(&diagonal.cross(&(s - p))) < 0.0
 }
 
 /// Cuts corners off until a triangle is left. A polygon that crosses itself has no ear at some
@@ -140,7 +168,7 @@ fn is_ear(flat: &[[f64; 2]], places: &[usize], at: usize) -> bool {
 mod tests {
     use super::*;
 
-    fn split(points: &[[f64; 3]], faces: &[&[i64]]) -> Vec<[u32; 3]> {
+    fn pieces(points: &[[f64; 3]], faces: &[&[i64]]) -> Vec<[u32; 3]> {
         let vertices: Vec<Point> = points.iter().map(|p| Point::from(*p)).collect();
         let polygons = Polygons { corners: faces.concat(), sizes: faces.iter().map(|f| f.len()).collect() };
         let pieces = triangulate(&vertices, &polygons).ok().expect("valid faces");
@@ -159,7 +187,7 @@ mod tests {
             [[0.0, 0.0, 0.0], [0.9, 0.1, 0.0], [1.0, 1.0, 0.0], [0.1, 0.9, 0.0]],
         ];
         for points in quads {
-            let all: Vec<_> = rotations(&[0, 1, 2, 3]).iter().map(|r| split(&points, &[r])).collect();
+            let all: Vec<_> = rotations(&[0, 1, 2, 3]).iter().map(|r| pieces(&points, &[r])).collect();
             assert!(all.iter().all(|t| *t == all[0]));
         }
     }
@@ -167,15 +195,31 @@ mod tests {
     #[test]
     fn equal_diagonals_are_settled_by_the_smallest_vertex() {
         let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-        assert_eq!(split(&square, &[&[2, 3, 0, 1]]), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(pieces(&square, &[&[2, 3, 0, 1]]), [[0, 1, 2], [0, 2, 3]]);
     }
 
     #[test]
     fn a_concave_quad_splits_inside() {
         let dart = [[0.0, 0.0, 0.0], [3.0, -2.0, 0.0], [1.0, 0.0, 0.0], [3.0, 2.0, 0.0]];
-        assert_eq!(split(&dart, &[&[0, 1, 2, 3]]), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(pieces(&dart, &[&[0, 1, 2, 3]]), [[0, 1, 2], [0, 2, 3]]);
         let turned = [dart[1], dart[2], dart[3], dart[0]];
-        assert_eq!(split(&turned, &[&[0, 1, 2, 3]]), [[0, 1, 3], [1, 2, 3]]);
+        assert_eq!(pieces(&turned, &[&[0, 1, 2, 3]]), [[0, 1, 3], [1, 2, 3]]);
+    }
+
+    #[test]
+    fn quads_are_drawn_by_the_diagonal_of_their_first_corner_but_where_they_are_folded_there() {
+        let bent = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.4], [1.2, 1.0, 0.0], [0.0, 1.0, 0.4]];
+        let dart = [[0.0, 0.0, 0.0], [3.0, -2.0, 0.0], [1.0, 0.0, 0.0], [3.0, 2.0, 0.0]];
+        let drawn = |points: &[[f64; 3]; 4], face: [i64; 4]| {
+            let vertices: Vec<Point> = points.iter().map(|p| Point::from(*p)).collect();
+            let polygons = Polygons { corners: face.to_vec(), sizes: vec![4] };
+            let pieces = triangulate_as_drawn(&vertices, &polygons).ok().expect("a valid face");
+            pieces.iter().map(|p| p.corners).collect::<Vec<_>>()
+        };
+        assert_eq!(drawn(&bent, [2, 3, 0, 1]), [[2, 3, 0], [2, 0, 1]]);
+        assert_eq!(drawn(&bent, [1, 2, 3, 0]), [[1, 2, 3], [1, 3, 0]]);
+        assert_eq!(drawn(&dart, [0, 1, 2, 3]), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(drawn(&dart, [1, 2, 3, 0]), [[1, 2, 0], [2, 3, 0]]);
     }
 
     #[test]
@@ -183,7 +227,7 @@ mod tests {
         let comb =
             [[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]];
         let points: Vec<[f64; 3]> = comb.iter().map(|&[x, y]| [x as f64, y as f64, 0.2 * x as f64]).collect();
-        let cover = split(&points, &[&(0..12).collect::<Vec<_>>()]);
+        let cover = pieces(&points, &[&(0..12).collect::<Vec<_>>()]);
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|i| points[i as usize]);
             ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2.0
@@ -192,7 +236,7 @@ mod tests {
         assert!(cover.iter().all(|t| area(t) >= 0.0));
         assert!((cover.iter().map(area).sum::<f64>() - 11.0).abs() < 1e-12);
         for rotation in rotations(&(0..12).collect::<Vec<_>>()) {
-            assert_eq!(split(&points, &[&rotation]), cover);
+            assert_eq!(pieces(&points, &[&rotation]), cover);
         }
     }
 
@@ -202,6 +246,6 @@ mod tests {
             .map(|k| (k as f64 * 0.8 * std::f64::consts::PI).sin_cos())
             .map(|(s, c)| [c, s, 0.0])
             .collect();
-        assert_eq!(split(&star, &[&[0, 1, 2, 3, 4]]).len(), 3);
+        assert_eq!(pieces(&star, &[&[0, 1, 2, 3, 4]]).len(), 3);
     }
 }

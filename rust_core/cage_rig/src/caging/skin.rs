@@ -7,7 +7,7 @@
 use super::symmetry::image;
 use crate::error::CagingError;
 use crate::geometry::bvh::Bvh;
-use crate::mesh::{triangulate, FaceFault, Polygons};
+use crate::mesh::{triangulate_as_drawn, FaceFault, Polygons};
 use crate::points::{bounding_diagonal, first_unusable, Point};
 use std::collections::HashMap;
 
@@ -70,7 +70,7 @@ impl Skin {
         if let Some(vertex) = first_unusable(vertices) {
             return Err(CagingError::SkinNotFinite { vertex });
         }
-        let pieces = triangulate(vertices, faces).map_err(|fault| match fault {
+        let pieces = triangulate_as_drawn(vertices, faces).map_err(|fault| match fault {
             FaceFault::FewCorners { face, corners } => CagingError::FewCorners { face, corners },
             FaceFault::BadIndex { face, vertex } => {
                 CagingError::BadIndex { face, vertex, vertices: vertices.len() }
