@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from .fields import chain, mirrored, union
 from .parts import Bone, Character, Part, Skin
 from .skin_weights import part_weights
@@ -19,7 +17,7 @@ _TAIL = ((0.0, 0.02, 0.45), (0.0, 0.30, 0.50))
 
 
 def doll(*, cell: float = 0.06, legs_first: bool = False, tail: bool = False) -> Character:
-    """The doll in triangles of about `cell` metres; `legs_first`: with its bones in another order."""
+    """The doll in quads of about `cell` metres, which are not flat; `legs_first`: with its bones in another order."""
     arm = chain(((0.15, 0.0, 0.71), *_ARM[1:]), (0.12, 0.10, 0.08), 0.02)
     leg = chain(((0.10, 0.0, 0.05), *_LEG[1:]), (0.16, 0.12, 0.09), 0.02)
     trunk = chain((*_SPINE[:2], (0.0, 0.0, 0.86)), (0.22, 0.20, 0.10), 0.05)
@@ -29,8 +27,7 @@ def doll(*, cell: float = 0.06, legs_first: bool = False, tail: bool = False) ->
     vertices, faces = mesh_field(field, (-1.0, -0.45, -1.0), (1.0, 0.45, 1.35), cell=cell)
     bones = [*_bones(legs_first), *([Bone("tail", *_TAIL, "spine")] if tail else [])]
     part = Part("doll", symmetrise(vertices), faces, "Doll", tuple(bone.name for bone in bones))
-    triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
-    skin = Skin("Doll", part.vertices, triangles, part_weights(part, bones))
+    skin = Skin("Doll", part.vertices, faces, part_weights(part, bones))
     return Character("Doll", [skin], bones, octahedron_cage((0.0, 0.0, 0.2), 3.0))
 
 
