@@ -12,11 +12,12 @@ HUMANS = ("human_2k_53b", "human_24k_52b", "human_200k_53b", "human_24k_163b")
 
 
 def arrays(**how):
-    """Skin, faces, and the bones as a graph."""
+    """Skin, triangles, and the bones as a graph."""
     character = doll(**how)
     skin, ends = character.skins[0], np.array([(bone.head, bone.tail) for bone in character.bones])
     nodes, edges = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
-    return skin.vertices, skin.faces, nodes, edges.reshape(-1, 2)
+    triangles = np.concatenate([skin.faces[:, [0, 1, 2]], skin.faces[:, [0, 2, 3]]])
+    return skin.vertices, triangles, nodes, edges.reshape(-1, 2)
 
 
 @pytest.fixture(scope="module")
