@@ -12,6 +12,7 @@ use super::finishing::Clock;
 use super::inflation::Inflation;
 use super::lineage::Lineage;
 use super::obstacle::{Mesh, Obstacles};
+use super::report::NARROW;
 use super::symmetry::image;
 use super::transplant::{transplant, Rings, Transplanted};
 use super::tubes::{Axis, Scaffold};
@@ -39,8 +40,6 @@ pub struct Earlier {
 /// How far new sections, and those next to a removed one, are widened for a start without crossings.
 const WIDTHS: [(f64, f64); 7] =
     [(1.0, 1.0), (1.03, 1.0), (1.1, 1.0), (1.15, 1.1), (1.4, 1.2), (1.8, 1.5), (2.5, 2.0)];
-/// No smaller angle, in degrees, comes of an edit.
-const NARROW: f64 = 5.0;
 /// How far a vertex may be from the image of its partner, relative to the size.
 const MIRRORED: f64 = 1e-5;
 

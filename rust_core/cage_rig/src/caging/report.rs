@@ -166,6 +166,9 @@ fn mean_distance(skin: &Skin, points: &[Point], faces: &[[u32; 3]]) -> f64 {
     total.0 / total.1.max(1e-300)
 }
 
+/// A face with a smaller angle, in degrees, is not good to deform with.
+pub(super) const NARROW: f64 = 5.0;
+
 pub(super) fn least_angle(t: [Point; 3]) -> f64 {
     (0..3).map(|k| (t[(k + 1) % 3] - t[k]).angle(&(t[(k + 2) % 3] - t[k])).to_degrees()).fold(180.0, f64::min)
 }

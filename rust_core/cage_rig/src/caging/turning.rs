@@ -4,13 +4,10 @@
 //! narrowest, and the faces that close the gap are as narrow. A corner at that place leaves the others
 //! room: two sections that face each other with a corner each have wider faces beside it.
 
-use super::report::least_angle;
+use super::report::{least_angle, NARROW};
 use super::sections::Section;
 use super::GeneratedCage;
 use crate::points::Point;
-
-/// A face with a smaller angle, in degrees, is worth another try.
-pub(super) const NARROW: f64 = 5.0;
 
 /// Sections at the shortest sides of too narrow faces, and their mirror images.
 pub(super) fn narrow(cage: &GeneratedCage) -> Vec<usize> {
