@@ -53,13 +53,24 @@ def _below_problem(cage: bpy.types.Object) -> str:
 
 
 def live_skins(cage: bpy.types.Object) -> list[tuple[int, bpy.types.Object]]:
-    """Skins that still are in the file's scenes, with their index in the rig."""
-    return [(k, skin.object) for k, skin in enumerate(cage.cage_rig.skins) if _in_use(skin.object)]
+    """Skins that still are in the file's scenes and the rig's to move, with their index in the rig."""
+    skins = enumerate(cage.cage_rig.skins)
+    return [(k, skin.object) for k, skin in skins if _in_use(skin.object) and not skin.applied]
 
 
-def lost_skins(cage: bpy.types.Object) -> int:
-    """How many skins of the rig were deleted."""
-    return len(cage.cage_rig.skins) - len(live_skins(cage))
+def lost_skins(cage: bpy.types.Object) -> str:
+    """What the artist should know of skins that were deleted or applied, or an empty string."""
+    applied = _applied(cage)
+    deleted = len(cage.cage_rig.skins) - len(applied) - len(live_skins(cage))
+    if deleted:
+        return f"{deleted} skin(s) of '{cage.name}' were deleted; Rebind forgets them"
+    if applied:
+        return f"Cage Rig was applied to '{applied[0]}', which keeps its shape and follows no more; Rebind forgets it"
+    return ""
+
+
+def _applied(cage: bpy.types.Object) -> list[str]:
+    return [skin.object.name for skin in cage.cage_rig.skins if skin.applied and _in_use(skin.object)]
 
 
 def _in_use(obj: bpy.types.Object | None) -> bool:
@@ -120,6 +131,12 @@ def _cage_problem(cage: bpy.types.Object) -> str:
 
 def _skins_problem(cage: bpy.types.Object) -> str:
     skins = live_skins(cage)
+    applied = _applied(cage)
+    if applied and not skins:
+        return Problem(
+            f"Cage Rig was applied to '{applied[0]}', which keeps its shape and follows no more; undo, or press Unbind",
+            "unbind",
+        )
     if not skins:
         return Problem(f"All skins of '{cage.name}' were deleted; undo, or press Unbind", "unbind")
     for index, obj in skins:

@@ -27,8 +27,8 @@ def bottom_up(cages: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def skins_of(cage: bpy.types.Object) -> list[bpy.types.Object]:
-    """The skins of a rig that still exist."""
-    return [skin.object for skin in cage.cage_rig.skins if skin.object is not None]
+    """The skins of a rig that still exist, and on which its modifier was not applied."""
+    return [skin.object for skin in cage.cage_rig.skins if skin.object is not None and not skin.applied]
 
 
 def may_stand_on(cage: bpy.types.Object, lower: bpy.types.Object) -> bool:

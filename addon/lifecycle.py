@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import binding, layers, migration, reading, sync
+from . import applied, binding, layers, migration, reading, sync
 from .adapters import armature, attributes, positions, shape_keys, stack
 from .installation import Bound, install, leave, remove_mesh, remove_object
 from .reading import BindError
@@ -157,13 +157,14 @@ def _write_bind(
 def _plan_rebind(context: bpy.types.Context, cage: bpy.types.Object) -> _Plan:
     settings = cage.cage_rig
     _refuse_foreign(cage)
+    applied.settle(cage)
     if settings.armature is None or not settings.armature.users_collection:
         raise BindError(f"The armature of '{cage.name}' was deleted; undo, or Unbind and bind with another")
     if settings.posed_cage is not None and settings.posed_cage.cage_rig.owner != cage:
         raise BindError(f"'{cage.name}' is a copy of another rig's cage; Unbind it, then bind it")
-    skins = [skin.object for skin in settings.skins if skin.object is not None and skin.object.users_collection]
+    skins = [obj for obj in layers.skins_of(cage) if obj.users_collection]
     if not skins:
-        raise BindError(f"All skins of '{cage.name}' were deleted; undo, or Unbind")
+        raise BindError(f"All skins of '{cage.name}' were deleted or applied; undo, or Unbind")
     bound, before = _read(context, cage, settings.armature, skins, settings.method), settings.coordinates
     fits = bool(before) and _same_rest(cage, bound)
     if fits:
@@ -237,6 +238,7 @@ def unbind(cage: bpy.types.Object) -> None:
     """
     settings = cage.cage_rig
     _refuse_foreign(cage)
+    applied.settle(cage)
     sync.drop(cage)
     owned = settings.posed_cage is None or settings.posed_cage.cage_rig.owner == cage
     for upper in [obj for obj in bpy.data.objects if obj.cage_rig.input == cage]:
@@ -347,7 +349,8 @@ def _rig_below(armature_object: bpy.types.Object, skins: tuple[bpy.types.Object,
             raise BindError(f"'{obj.name}' is the cage of a rig; Unbind it first, or leave it out of the selection")
         if settings.part == "NONE" or settings.owner is None:
             continue
-        if settings.part != "SKIN" or settings.owner.cage_rig.armature != armature_object:
+        shared = obj in layers.skins_of(settings.owner) and settings.owner.cage_rig.armature == armature_object
+        if settings.part != "SKIN" or not shared:
             raise BindError(f"'{obj.name}' belongs to the rig of cage '{settings.owner.name}'; Unbind that first")
         if lower not in (None, settings.owner):
             raise BindError(

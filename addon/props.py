@@ -90,6 +90,9 @@ class CageRigSkin(bpy.types.PropertyGroup):
         update=_tag,
         override=OVERRIDABLE,
     )
+    applied: BoolProperty(
+        name="Applied", description="Whether its modifier was applied, so that it left the rig", override=OVERRIDABLE
+    )
     skin_to_rig: FloatVectorProperty(name="Skin to Rig", subtype="MATRIX", size=(4, 4), override=OVERRIDABLE)
 
 

@@ -9,7 +9,20 @@ from __future__ import annotations
 
 import bpy
 
-from . import binding, choosing, glance, health, layers, linked, migration, posed_edits, registry, showing, skins
+from . import (
+    applied,
+    binding,
+    choosing,
+    glance,
+    health,
+    layers,
+    linked,
+    migration,
+    posed_edits,
+    registry,
+    showing,
+    skins,
+)
 from .adapters import armature, modifier, positions, stack
 from .running import Event, Matrix, Points, Running
 from .session import Below, Bones, Session, SessionCrash, SessionError
@@ -180,6 +193,7 @@ def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> boo
     if linked.adopt(cage):
         registry.forget()
         anew = True
+    applied.settle(cage)
     for obj in layers.skins_of(cage):
         layers.settle(obj)
     trouble = health.problem(cage)
@@ -316,9 +330,7 @@ def _resume(cage: bpy.types.Object, note: str) -> None:
             modifier.set_shown(obj, True)
             if stack.reads_back(obj):
                 _ask_again(cage)
-    lost = health.lost_skins(cage)
-    if not note and lost:
-        note = f"{lost} skin(s) of '{cage.name}' were deleted; Rebind forgets them"
+    note = note or health.lost_skins(cage)
     if settings.message != note:
         settings.message = note
     if settings.fix:

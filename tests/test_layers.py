@@ -22,6 +22,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "adapters": ({"bpy", "bmesh", "mathutils", "numpy"}, {"adapters", "compat"}),
     "layers": ({"bpy"}, {"adapters"}),
     "linked": ({"bpy"}, {"adapters"}),
+    "applied": ({"bpy", "numpy"}, {"adapters", "layers"}),
     "registry": ({"bpy"}, {"adapters", "layers"}),
     "health": ({"bpy", "numpy"}, {"adapters", "layers", "linked"}),
     "glance": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
@@ -33,7 +34,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "showing": ({"bpy", "numpy"}, {"adapters", "binding", "health", "running", "skins"}),
     "sync": (
         {"bpy", "numpy"},
-        {"adapters", "binding", "choosing", "glance", "health", "layers", "linked", "migration"}
+        {"adapters", "applied", "binding", "choosing", "glance", "health", "layers", "linked", "migration"}
         | {"posed_edits", "registry", "running", "session", "showing", "skins"},
     ),
     "generator": ({"cage_rig_core", "hashlib", "numpy"}, set()),
@@ -41,7 +42,7 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "installation": ({"bpy", "numpy"}, {"adapters", "binding", "layers", "session", "sync"}),
     "lifecycle": (
         {"bpy", "numpy"},
-        {"adapters", "binding", "installation", "layers", "migration", "reading", "session", "sync"},
+        {"adapters", "applied", "binding", "installation", "layers", "migration", "reading", "session", "sync"},
     ),
     "bake": (
         {"bpy", "mathutils", "numpy", "pathlib", "shutil", "struct"},

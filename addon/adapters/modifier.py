@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .. import compat
 from . import positions
-from .node_group import ATTRIBUTE, INDEX, INPUT, NAME, complete, identifier, is_current, node_group
+from .node_group import ATTRIBUTE, INDEX, INPUT, NAME, OURS, complete, identifier, is_current, node_group
 from .positions import Points
 
 
@@ -125,6 +125,16 @@ def is_fed(skin: bpy.types.Object) -> bool:
     return ATTRIBUTE in skin.data.attributes
 
 
+def read_fed(skin: bpy.types.Object) -> Points | None:
+    """What was last fed to the skin's own mesh, `#M by 3`; None where nothing was."""
+    attribute = skin.data.attributes.get(ATTRIBUTE)
+    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
+        return None
+    points = np.empty((len(skin.data.vertices), 3), np.float32)
+    attribute.data.foreach_get("vector", points.ravel())
+    return points
+
+
 def _is_linked(mesh: bpy.types.Mesh) -> bool:
     """Whether what is written to the mesh is lost or does nothing."""
     return mesh.library is not None or mesh.override_library is not None
@@ -164,8 +174,10 @@ def remove(skin: bpy.types.Object, cage: bpy.types.Object | None) -> None:
                 bpy.data.node_groups.remove(group)
             if feed is not None and feed.users == 0 and feed.library is None:
                 bpy.data.meshes.remove(feed.data)
-    if not ours(skin) and skin.data is not None and not _is_linked(skin.data) and ATTRIBUTE in skin.data.attributes:
-        skin.data.attributes.remove(skin.data.attributes[ATTRIBUTE])
+    if not ours(skin) and skin.data is not None and not _is_linked(skin.data):
+        # the feed, and where a modifier was applied what it kept
+        for name in [found.name for found in skin.data.attributes if found.name.startswith(OURS)]:
+            skin.data.attributes.remove(skin.data.attributes[name])
 
 
 def set_shown(skin: bpy.types.Object, shown: bool) -> None:
@@ -192,7 +204,7 @@ def keep_mask(skin: bpy.types.Object, cage: bpy.types.Object, group: str) -> boo
 
 
 def _mask_name(cage: bpy.types.Object) -> str:
-    return f"cage_rig.mask.{cage.cage_rig.bind_id[:8]}"
+    return f"{OURS}mask.{cage.cage_rig.bind_id[:8]}"
 
 
 def read_input(skin: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points | None:

@@ -14,9 +14,10 @@ from collections.abc import Iterator
 import bpy
 
 NAME = "Cage Rig"
-ATTRIBUTE = "cage_rig.posed"
-INPUT = "cage_rig.input"
-INDEX = "cage_rig.index"  # kept beside the two: the proof that modifiers after ours reorder nothing
+OURS = "cage_rig."  # what the names of all our attributes of a skin begin with
+ATTRIBUTE = f"{OURS}posed"
+INPUT = f"{OURS}input"
+INDEX = f"{OURS}index"  # kept beside the two: the proof that modifiers after ours reorder nothing
 
 SOCKETS = {
     "Attribute": "NodeSocketString",

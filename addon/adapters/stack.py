@@ -108,6 +108,13 @@ def restore_suspended(obj: bpy.types.Object) -> None:
     obj.cage_rig.suspended.clear()
 
 
+def keep_suspended_off(obj: bpy.types.Object) -> None:
+    """Leave suspended modifiers whole and hidden, also when they are put back: their work is in the mesh."""
+    for record in obj.cage_rig.suspended:
+        record.show_viewport = record.show_render = False
+    show_suspended(obj, True)
+
+
 def place(skin: bpy.types.Object, armature: bpy.types.Object) -> int:
     """Where our modifier is in the skin's stack, or belongs: at the armature's modifier, else before all others."""
     if ours(skin):
