@@ -51,6 +51,17 @@ LABELS: dict[str, tuple[str, str, str]] = {
     "Anchors": ("Anker", "Ancres", "Anclajes"),
     "Fading Cages": ("Verblassende Käfige", "Cages en fondu", "Jaulas que se desvanecen"),
     "Radius": ("Radius", "Rayon", "Radio"),
+    "Placement": ("Platzierung", "Placement", "Colocación"),
+    "Corners": ("Ecken", "Coins", "Esquinas"),
+    "Clearance": ("Abstand", "Dégagement", "Holgura"),
+    "Tightness": ("Straffheit", "Ajustement", "Ajuste"),
+    "Leave Out": ("Auslassen", "Omettre", "Omitir"),
+    "Like": ("Wie", "Comme", "Como"),
+    "Cage Repaired Hull": (
+        "Reparierte Hülle umschließen",
+        "Entourer l'enveloppe réparée",
+        "Rodear envolvente reparada",
+    ),
     "Elsewhere": ("Anderswo", "Ailleurs", "En otros lugares"),
 }
 BUTTONS: dict[str, tuple[str, str, str]] = {

@@ -18,7 +18,7 @@ import bpy
 
 from ..generator import Cancelled, Job, Refusal
 from . import alike, character, refusals, result
-from .alike import corners_of
+from .alike import cages, corners_of, suggested
 from .character import Character
 from .course import OnBone
 from .editing import Editing, Source
@@ -36,6 +36,7 @@ __all__ = [
     "OnBone",
     "Options",
     "Source",
+    "cages",
     "corners_of",
     "edit",
     "finish",
@@ -48,6 +49,7 @@ __all__ = [
     "refuse_cage",
     "source",
     "start",
+    "suggested",
 ]
 
 
@@ -154,7 +156,9 @@ def finish(
     made = job.result()
     obj = result.write(context, cage, made, found, options, nodes)
     if tell is not None:
-        tell(result.summary(obj, made, [*found.notes, *character.left_out(found, made.dropped)]))
+        others = [] if found.model is not None else suggested(context.scene, obj)[:1]
+        hints = [f"To give it the faces of '{other.name}', choose that cage in Like" for other in others]
+        tell(result.summary(obj, made, [*found.notes, *character.left_out(found, made.dropped), *hints]))
     return obj
 
 

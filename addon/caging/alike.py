@@ -14,6 +14,8 @@ from ..generator import Like, Points, Refusal
 from .refusals import GenerateError, Scene
 
 SECTION = "cage_rig_section"
+FEW = 3  # bones of the same names that say something
+SHARED = 0.8  # of a cage's bones, where two characters may be one
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,31 @@ def corners_of(cage: bpy.types.Object) -> int:
             f"'{cage.name}' has other vertices than Generate Cage gave it; choose a cage for Like that has all of them"
         )
     return corners
+
+
+def cages(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The scene's generated cages."""
+    return [obj for obj in scene.objects if obj.type == "MESH" and sections_of(obj) is not None]
+
+
+def suggested(scene: bpy.types.Scene, cage: bpy.types.Object) -> list[bpy.types.Object]:
+    """Other cages of the scene around bones of the same names, whose faces this one could have and has not."""
+    own, found = _bones(cage), []
+    for other in cages(scene) if cage.type == "MESH" and sections_of(cage) is not None else ():
+        shared = own & _bones(other)
+        if other != cage and len(shared) >= FEW and len(shared) >= SHARED * len(own) and not same_faces(cage, other):
+            found.append(other)
+    return found
+
+
+def same_faces(cage: bpy.types.Object, other: bpy.types.Object) -> bool:
+    """Whether two meshes have the same faces, index for index."""
+    pairs = zip(positions.read_faces(cage.data), positions.read_faces(other.data), strict=True)
+    return all(np.array_equal(mine, its) for mine, its in pairs)
+
+
+def _bones(cage: bpy.types.Object) -> set[str]:
+    return {group.name for group in cage.vertex_groups}
 
 
 def sections_of(cage: bpy.types.Object) -> NDArray[np.int32] | None:

@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from ..adapters import positions, vertex_groups
 from ..generator import Cage, Earlier, Points
-from .alike import SECTION, sections_of
+from .alike import SECTION, same_faces, sections_of
 from .character import Character
 from .course import OnBone
 from .options import Options
@@ -158,13 +158,8 @@ def summary(cage: bpy.types.Object, made: Cage, notes: list[str]) -> str:
         f"'{cage.name}': {len(made.points)} vertices in {len(made.sections)} cross sections, {quads} quads and "
         f"{triangles} triangles, {made.report['volume_ratio']:.2f} times the volume of what it encloses"
     )
-    if cage.cage_rig_generated.like is not None and _same_faces(cage, cage.cage_rig_generated.like):
+    if cage.cage_rig_generated.like is not None and same_faces(cage, cage.cage_rig_generated.like):
         text += f", with the faces of '{cage.cage_rig_generated.like.name}'"
     if made.report["kept_vertices"]:
         text += f"; {made.report['kept_vertices']} vertices are where they were"
     return ". ".join([text, *notes])
-
-
-def _same_faces(cage: bpy.types.Object, other: bpy.types.Object) -> bool:
-    pairs = zip(positions.read_faces(cage.data), positions.read_faces(other.data), strict=True)
-    return all(np.array_equal(mine, its) for mine, its in pairs)

@@ -17,7 +17,13 @@ PLACEMENTS = [
     ("AUTOMATIC", "Automatic", "Where limbs bend or change their girth", 0),
     ("JOINTS", "Joints", "At the joints of the armature", 1),
 ]
+
 OPTIONS = ("placement", "corners", "triangles", "clearance", "tightness", "detail", "symmetry", "hull")
+
+
+def _offered(_operator: bpy.types.Operator, context: bpy.types.Context, _typed: str) -> list[str]:
+    """The cages that the field Like offers."""
+    return [cage.name for cage in caging.cages(context.scene) if cage != context.object]
 
 
 class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
@@ -64,6 +70,7 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
         name="Like",
         description="A cage that Generate Cage made, for another level of detail of this character: "
         "the new one gets its cross sections and faces, so that shape keys and weights fit both",
+        search=_offered,
         options={"SKIP_SAVE"},
     )
     own_nodes: BoolProperty(
@@ -174,7 +181,10 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
             row = layout.row()
             row.enabled = name != "placement" or not self.own_nodes
             row.prop(self, name)
-        layout.prop_search(self, "like", context.scene, "objects")
+        layout.prop(self, "like", icon="MOD_LATTICE")
+        cage = context.object
+        for other in caging.suggested(context.scene, cage)[:1] if cage is not None and not self.like else []:
+            layout.label(text=f"'{other.name}' has the same bones", icon="INFO")
 
     def _chosen(
         self, context: bpy.types.Context

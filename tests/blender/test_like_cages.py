@@ -110,6 +110,23 @@ def test_the_button_makes_it_and_the_cage_remembers_it(
     assert bpy.ops.cage_rig.generate_cage(clearance=0.002) == {"FINISHED"}, "its own faces again"
 
 
+def test_a_cage_that_could_have_the_faces_of_another_one_says_so(
+    caging: ModuleType, like: bpy.types.Object, fine: uncaged.Uncaged
+) -> None:
+    told: list[str] = []
+    cage = caging.generate_cage(bpy.context, *fine, tell=told.append)
+    assert told[0].endswith(f". To give it the faces of '{like.name}', choose that cage in Like")
+    scene = bpy.context.scene
+    assert caging.suggested(scene, cage) == [like] and set(caging.cages(scene)) == {cage, like}
+    alike = caging.generate_cage(bpy.context, *fine, like=like, tell=told.append)
+    assert "choose that cage" not in told[1] and like not in caging.suggested(scene, alike)
+    bar = build_character(capsule())
+    bpy.data.objects.remove(bar.cage)
+    caging.generate_cage(bpy.context, bar.skins, bar.armature, tell=told.append)
+    assert "choose that cage" not in told[2], "of other bones"
+    assert caging.suggested(scene, fine[0][0]) == []
+
+
 def points(cage: bpy.types.Object) -> np.ndarray:
     found = np.empty(3 * len(cage.data.vertices), np.float32)
     cage.data.vertices.foreach_get("co", found)
