@@ -1,4 +1,4 @@
-"""Generate the cage of another level of detail by hand, and give it the faces of the first in the panel that adjusts."""
+"""Generate the cage of another level of detail by hand, and give it the faces of the first in the redo panel."""
 
 from __future__ import annotations
 
