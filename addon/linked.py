@@ -47,6 +47,15 @@ def own_mesh(obj: bpy.types.Object) -> bool:
     return True
 
 
+def own_posed_mesh(cage: bpy.types.Object) -> None:
+    """Give a linked duplicate (Alt D) of a rig a posed cage that no other rig writes to."""
+    posed = cage.cage_rig.posed_cage
+    if posed is None or posed.type != "MESH" or posed.data.is_editmode or posed.library or posed.override_library:
+        return
+    if posed.data.users - posed.data.use_fake_user > 1:
+        posed.data = posed.data.copy()
+
+
 def problem(cage: bpy.types.Object) -> str:
     """Why a linked rig can't run, or an empty string."""
     if cage.library is None:

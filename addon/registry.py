@@ -20,8 +20,8 @@ Key = tuple[str, str | None]  # an object's name and the path of its library
 @dataclass
 class _Found:
     count: int = -1  # objects in the file when it was looked through
-    names: list[Key] = field(default_factory=list)
-    participants: dict[int, set[Key]] = field(default_factory=dict)  # session uid -> rest cages
+    names: dict[Key, int] = field(default_factory=dict)  # of rest cages -> their session uids
+    participants: dict[int, set[int]] = field(default_factory=dict)  # session uid -> those of rest cages
 
 
 _found = _Found()
@@ -36,7 +36,7 @@ def rigs() -> list[bpy.types.Object]:
     """The rest cage objects of all rigs in the file, in the order in which they act."""
     if _found.count != len(bpy.data.objects):
         _look()
-    return layers.bottom_up(_cages(_found.names))
+    return layers.bottom_up(_cages())
 
 
 def key_of(obj: bpy.types.Object) -> Key:
@@ -49,12 +49,14 @@ def find(key: Key) -> bpy.types.Object | None:
     return bpy.data.objects.get(key)
 
 
-def _cages(keys: list[Key]) -> list[bpy.types.Object]:
-    cages = [find(key) for key in keys]
-    if any(cage is None or not is_rig(cage) for cage in cages):  # renamed or gone
+def _cages() -> list[bpy.types.Object]:
+    if not all(_is_same(find(key), uid) for key, uid in _found.names.items()):  # renamed, replaced or gone
         _look()
-        return [bpy.data.objects[key] for key in _found.names]
-    return cages
+    return [bpy.data.objects[key] for key in _found.names]
+
+
+def _is_same(cage: bpy.types.Object | None, uid: int) -> bool:
+    return cage is not None and cage.session_uid == uid and is_rig(cage)
 
 
 def is_rig(obj: bpy.types.Object) -> bool:
@@ -66,12 +68,26 @@ def touched(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
     """The rigs of which a participant is among the updates of `depsgraph`. Runs on every update: must idle cheaply."""
     if _found.count != len(bpy.data.objects):
         _look()
-    if not _found.participants:
+    found, known = _touched(depsgraph)
+    if not known:  # objects were replaced by as many others
+        _look()
+        found, _ = _touched(depsgraph)
+    if not found:
         return []
-    names: set[Key] = set()
+    return layers.bottom_up([cage for cage in _cages() if cage.session_uid in found])
+
+
+def _touched(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], bool]:
+    """Session uids of the rest cages that are touched, and whether all rigs among the updates are known."""
+    found: set[int] = set()
     for update in depsgraph.updates:
-        names |= _found.participants.get(update.id.original.session_uid, set())
-    return layers.bottom_up(_cages([key for key in _found.names if key in names])) if names else []
+        changed = update.id.original
+        touched = _found.participants.get(changed.session_uid)
+        if touched:
+            found |= touched
+        elif isinstance(changed, bpy.types.Object) and is_rig(changed):
+            return found, False
+    return found, True
 
 
 def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
@@ -94,12 +110,12 @@ def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
 def _look() -> None:
     _found.count = len(bpy.data.objects)
     cages = [obj for obj in bpy.data.objects if is_rig(obj)]
-    _found.names = [key_of(cage) for cage in cages]
+    _found.names = {key_of(cage): cage.session_uid for cage in cages}
     _found.participants = {}
     _release_strays()
     for cage in cages:
         for datablock in participants(cage):
-            _found.participants.setdefault(datablock.session_uid, set()).add(key_of(cage))
+            _found.participants.setdefault(datablock.session_uid, set()).add(cage.session_uid)
 
 
 def _release_strays() -> None:

@@ -47,8 +47,14 @@ class Running:
     @classmethod
     def of(cls, cage: bpy.types.Object, session: Session) -> Running:
         """The rig of this rest cage, bound in `session`."""
+        found = cls(session, cage.cage_rig.bind_id, None)
+        found.place(cage)
+        return found
+
+    def place(self, cage: bpy.types.Object) -> None:
+        """Take over where the file says that the cage is in rig space."""
         matrix = np.array(cage.cage_rig.cage_to_rig, np.float64)
-        return cls(session, cage.cage_rig.bind_id, None if np.array_equal(matrix, np.eye(4)) else matrix)
+        self.cage_to_rig = None if np.array_equal(matrix, np.eye(4)) else matrix
 
     def wanted(self) -> Points:
         """The rest cage that Blender has, or will have when what was written is read."""

@@ -18,6 +18,7 @@ from . import (
     layers,
     linked,
     migration,
+    placing,
     posed_edits,
     registry,
     showing,
@@ -153,7 +154,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     running = _running.get(cage.session_uid)
     known = running is not None and event is Event.FRAME and running.seen is not None
     known = known and running.seen == glance.seen(cage)
-    if not known and not _look_closely(cage, depsgraph):
+    if not known and not _look_closely(cage, depsgraph, event):
         return
     source, bones = cage.evaluated_get(depsgraph), cage.cage_rig.armature.evaluated_get(depsgraph)
     if not (source.is_evaluated and bones.is_evaluated):
@@ -161,6 +162,8 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     if running is None or running.bind_id != cage.cage_rig.bind_id:  # an undo may bring back another bind
         running = _running[cage.session_uid] = Running.of(cage, binding.bound_anew(cage))
         event = Event.RESTORED
+    elif not known:
+        running.place(cage)
     if event is Event.RESTORED:
         running.written.clear()
         running.cage_wanted, running.memory = None, b""
@@ -179,7 +182,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
         _resume(cage, note)
 
 
-def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> bool:
     """Whether the rig can run; where it can't it is paused, or nobody sees it."""
     if cage.library is not None and not cage.evaluated_get(depsgraph).is_evaluated:
         return False  # what a library override was made from
@@ -193,7 +196,10 @@ def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> boo
     if linked.adopt(cage):
         registry.forget()
         anew = True
+    linked.own_posed_mesh(cage)
     applied.settle(cage)
+    if event is not Event.FRAME and depsgraph.mode == "VIEWPORT":
+        placing.settle(cage, depsgraph)
     for obj in layers.skins_of(cage):
         layers.settle(obj)
     trouble = health.problem(cage)
@@ -242,6 +248,8 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
     known = running.wanted()
     session.play_posed(known, bones, pose, influence)
     before, running.posed = running.posed, posed
+    if posed_changed and before is not None and placing.posed_has_stayed(cage, before, posed, depsgraph):
+        is_edit, running.posed = False, None
     if is_edit and running.stale and before is not None:
         posed = session.posed_cage() + (posed - before)  # made on the shape of another pose
     return posed_edits.take(cage, running, posed) if is_edit else ""

@@ -108,9 +108,11 @@ def _hand_over(modifier: bpy.types.Modifier, leader: bpy.types.Modifier) -> None
 def write(skin: bpy.types.Object, points: Points) -> None:
     """Feed posed coordinates (`#M by 3`, the skin's own space) to the modifier. Not in Edit Mode of the skin."""
     mesh = skin.data
-    if _is_linked(mesh):
+    if _is_linked(mesh) or _is_shared(mesh):
         positions.write_base(_own_feed(skin).data, points)
         return
+    if read(_leader(skin), "Use Feed"):  # it was shared
+        _drop_feed(skin)
     attribute = mesh.attributes.get(ATTRIBUTE)
     if attribute is None:
         attribute = mesh.attributes.new(ATTRIBUTE, "FLOAT_VECTOR", "POINT")
@@ -120,13 +122,16 @@ def write(skin: bpy.types.Object, points: Points) -> None:
 
 def is_fed(skin: bpy.types.Object) -> bool:
     """Whether `write` has written to the skin, and nothing has taken that away."""
-    if _is_linked(skin.data):
+    if _is_linked(skin.data) or _is_shared(skin.data):
         return _feed(skin) is not None
-    return ATTRIBUTE in skin.data.attributes
+    return ATTRIBUTE in skin.data.attributes and not read(_leader(skin), "Use Feed")
 
 
 def read_fed(skin: bpy.types.Object) -> Points | None:
-    """What was last fed to the skin's own mesh, `#M by 3`; None where nothing was."""
+    """What was last fed to the skin, `#M by 3`; None where nothing was. Also after its modifier is gone."""
+    feed = next((obj for obj in bpy.data.objects if obj.cage_rig.owner == skin and obj.type == "MESH"), None)
+    if feed is not None:
+        return positions.read_base(feed.data)
     attribute = skin.data.attributes.get(ATTRIBUTE)
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
         return None
@@ -140,6 +145,11 @@ def _is_linked(mesh: bpy.types.Mesh) -> bool:
     return mesh.library is not None or mesh.override_library is not None
 
 
+def _is_shared(mesh: bpy.types.Mesh) -> bool:
+    """Whether other objects have the mesh too: linked duplicates (Alt D) are posed each by its own rig."""
+    return mesh.users - mesh.use_fake_user > 1
+
+
 def _leader(skin: bpy.types.Object) -> bpy.types.Modifier:
     return next(modifier for modifier in ours(skin) if read(modifier, "Attribute"))
 
@@ -150,7 +160,18 @@ def _feed(skin: bpy.types.Object) -> bpy.types.Object | None:
     feed = read(leader, "Feed") if read(leader, "Use Feed") else None
     if feed is None or feed.library is not None or len(feed.data.vertices) != len(skin.data.vertices):
         return None
-    return feed
+    return feed if feed.cage_rig.owner in (None, skin) else None  # a duplicate has it from the first one
+
+
+def _drop_feed(skin: bpy.types.Object) -> None:
+    feed = read(_leader(skin), "Feed")
+    set_inputs(_leader(skin), {"Use Feed": False, "Feed": None})
+    _remove_feed(feed)
+
+
+def _remove_feed(feed: bpy.types.Object | None) -> None:
+    if feed is not None and feed.users == 0 and feed.library is None:
+        bpy.data.meshes.remove(feed.data)
 
 
 def _own_feed(skin: bpy.types.Object) -> bpy.types.Object:
@@ -159,6 +180,7 @@ def _own_feed(skin: bpy.types.Object) -> bpy.types.Object:
         mesh = bpy.data.meshes.new(f"{skin.name} Result")
         mesh.vertices.add(len(skin.data.vertices))
         feed = bpy.data.objects.new(mesh.name, mesh)
+        feed.cage_rig.owner = skin
         set_inputs(_leader(skin), {"Use Feed": True, "Feed": feed})
         feed.parent = None  # an input that is set does not make Blender look for new dependencies; this does
     return feed
@@ -169,11 +191,11 @@ def remove(skin: bpy.types.Object, cage: bpy.types.Object | None) -> None:
     for modifier in ours(skin):
         if cage is None or cage_of(modifier) in (cage, None):
             group, feed = modifier.node_group, read(modifier, "Feed")
+            set_inputs(modifier, {"Feed": None})  # or Blender 5.2 goes on counting the modifier among its users
             skin.modifiers.remove(modifier)
             if group.users == 0 and group.library is None:
                 bpy.data.node_groups.remove(group)
-            if feed is not None and feed.users == 0 and feed.library is None:
-                bpy.data.meshes.remove(feed.data)
+            _remove_feed(feed)
     if not ours(skin) and skin.data is not None and not _is_linked(skin.data):
         # the feed, and where a modifier was applied what it kept
         for name in [found.name for found in skin.data.attributes if found.name.startswith(OURS)]:

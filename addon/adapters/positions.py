@@ -18,6 +18,12 @@ def read_base(mesh: bpy.types.Mesh) -> Points:
     return points
 
 
+def read_some(mesh: bpy.types.Mesh, count: int) -> NDArray[np.float64]:
+    """Base coordinates of so many vertices from the first to the last, `count by 3`. Not in Edit Mode."""
+    last = len(mesh.vertices) - 1
+    return np.array([mesh.vertices[k * last // (count - 1)].co for k in range(count)], np.float64)
+
+
 def read_evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Points:
     """Coordinates after shape keys and modifiers in `depsgraph`, `#V by 3`. Not for objects in Edit Mode."""
     return read_base(obj.evaluated_get(depsgraph).data)

@@ -356,3 +356,37 @@ def test_an_unforeseen_error_pauses_and_never_raises(bar: Rig, monkeypatch: pyte
     bend(bar, 0.5)
     assert bar.settings.state == "LIVE"
     assert np.abs(shown(bar.skin) - native(bar.skin)).max() < 1e-5 * bar.size
+
+
+def test_rigs_that_exchange_their_names_are_told_apart() -> None:
+    one, other = bound_bar(), bound_bar()
+    names = one.cage.name, other.cage.name
+    one.cage.name, other.cage.name = "Between", names[0]
+    one.cage.name = names[1]
+    bend(one, 0.8)
+    assert np.abs(shown(one.skin) - native(one.skin)).max() < 1e-6
+
+
+def test_a_rig_that_takes_the_place_of_as_many_objects_is_found(tmp_path: Path) -> None:
+    path = str(tmp_path / "bar.blend")
+    count = len(bpy.data.objects)
+    bound_bar()
+    count = len(bpy.data.objects) - count
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for k in range(count):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(f"Empty {k}", None))
+    update()
+    for _ in range(2):  # in place of other objects, and of a rig of the same name
+        bpy.data.batch_remove(list(bpy.data.objects))
+        with bpy.data.libraries.load(path) as (there, here):
+            here.objects = list(there.objects)
+        for obj in here.objects:
+            if obj.cage_rig.part != "NONE" or obj.type == "ARMATURE" or obj.cage_rig.state != "NONE":
+                bpy.context.scene.collection.objects.link(obj)
+        update()
+        objects = bpy.data.objects
+        rig = Rig([objects["Bar"]], objects["BarRig"], objects["BarCage"])
+        bend(rig, 0.8)
+        assert np.abs(shown(rig.skin) - rest(rig.skin)).max() > 0.1, rig.settings.message
+        assert np.abs(shown(rig.skin) - native(rig.skin)).max() < 1e-6

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cages, skins and armatures whose transforms were applied, or whose origins were set: their points have other
+coordinates and are where they were. The rig takes that over, so that nothing moves.
+
+It is seen in the file alone, whatever was done meanwhile: an undo may come back to a step that was saved in between.
+"""
+
+from __future__ import annotations
+
+import uuid
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from . import binding, layers
+from .adapters import armature, positions
+from .skins import is_flat
+
+SEEN = "cage_rig_place"  # on the posed cage's mesh: where the rest cage was last, and four points of it
+NEAR = 1e-5  # of the size
+SAMPLES = 8  # vertices of a skin that are looked at first
+Matrix4 = NDArray[np.float64]
+Points = NDArray[np.float64]
+
+
+def settle(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Take over what Apply or Set Origin did. Where points were moved as well, nothing is taken over."""
+    settings = cage.cage_rig
+    objects = (cage, settings.armature, settings.posed_cage)
+    if any(obj is None or obj.data is None or not layers.is_own(obj) or obj.mode == "EDIT" for obj in objects):
+        return
+    worlds = [_world(obj, depsgraph) for obj in objects]
+    kinds = [obj.type for obj in objects]
+    if settings.snapshot is None or kinds != ["MESH", "ARMATURE", "MESH"] or any(map(is_flat, worlds)):
+        return
+    _settle_cage(cage, worlds[0])
+    if not _settle_skins(cage, worlds[1], depsgraph):
+        change = _of_armature(cage, worlds[1], depsgraph)
+        if change is not None:
+            _rebase(cage, change, depsgraph)
+            _settle_skins(cage, worlds[1], depsgraph)
+
+
+def _world(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix4:
+    return np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64)
+
+
+def _moved(matrix: Matrix4, points: Points) -> Points:
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _same(one: Points, other: Points, size: float) -> bool:
+    return one.shape == other.shape and bool(np.abs(one - other).max() <= NEAR * size)
+
+
+def _size(points: Points) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0))) + 1e-30
+
+
+def _settle_cage(cage: bpy.types.Object, world: Matrix4) -> None:
+    mesh, points = cage.cage_rig.posed_cage.data, positions.read_base(cage.data).astype(np.float64)
+    marks = _marks(points)
+    state = [*world.ravel().tolist(), *marks.ravel().tolist()]
+    seen = list(mesh.get(SEEN, ()))
+    if seen == state:
+        return
+    if len(seen) == len(state):
+        before, old = np.reshape(seen[:16], (4, 4)), np.reshape(seen[16:], (-1, 3))
+        change = np.linalg.inv(world) @ before
+        size = _size(points)
+        if _same(marks, _moved(change, old), size) and not _same(marks, old, size):
+            to_rig = np.array(cage.cage_rig.cage_to_rig, np.float64) @ np.linalg.inv(change)
+            cage.cage_rig.cage_to_rig = to_rig.T.tolist()
+    mesh[SEEN] = state
+
+
+def _marks(points: Points) -> Points:
+    """Four points that go with any affine map of all points, and with hardly anything else."""
+    waves = np.cos(np.outer(np.arange(1.0, 5.0), np.arange(len(points))))
+    weights = 1.0 + 0.9 * waves
+    return (weights / weights.sum(1, keepdims=True)) @ points
+
+
+def _settle_skins(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Take over skins that were applied alone. Returns whether all that can be looked at rest where they were bound."""
+    whole = True
+    for skin in _skins(cage):
+        now, bound = np.linalg.inv(bones) @ _world(skin.object, depsgraph), np.array(skin.skin_to_rig, np.float64)
+        base, rest = (positions.read_some(mesh, SAMPLES) for mesh in (skin.object.data, skin.snapshot))
+        size = _size(rest)
+        if not _same(_moved(now, base), rest, size):
+            whole = False
+        elif np.isfinite(bound).all() and not _same(_moved(bound, base), rest, size):
+            skin.skin_to_rig = now.T.tolist()
+    return whole
+
+
+def _skins(cage: bpy.types.Object) -> list[bpy.types.PropertyGroup]:
+    def may_be(skin: bpy.types.PropertyGroup) -> bool:
+        obj, snapshot = skin.object, skin.snapshot
+        if obj is None or skin.applied or snapshot is None or obj.type != "MESH" or not layers.is_own(obj):
+            return False
+        return not obj.data.is_editmode and 0 < len(obj.data.vertices) == len(snapshot.vertices)
+
+    return [skin for skin in cage.cage_rig.skins if may_be(skin)]
+
+
+def _of_armature(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.Depsgraph) -> Matrix4 | None:
+    """From rig space as it was bound to the armature's present space, where bones and skins agree on that."""
+    rest = armature.read_rest(cage.cage_rig.armature.data)
+    place = {name: k for k, name in enumerate(rest.names)}
+    joints = cage.cage_rig.joints
+    if any(joint.name not in place for joint in joints):
+        return None
+    order = [place[joint.name] for joint in joints]
+    now = np.concatenate([rest.heads[order], rest.tails[order]])
+    heads = np.array([np.add(joint.head, joint.shift) for joint in joints], np.float64)
+    ways = np.array([np.subtract(joint.tail, joint.head) for joint in joints], np.float64)
+    then = np.concatenate([heads, heads + ways])
+    if _same(now, then, _size(then)):
+        return None
+    for skin in _skins(cage):
+        base, old = (positions.read_base(mesh).astype(np.float64) for mesh in (skin.object.data, skin.snapshot))
+        new = _moved(np.linalg.inv(bones) @ _world(skin.object, depsgraph), base)
+        change = np.eye(4)
+        change[:3] = np.linalg.lstsq(np.c_[old, np.ones(len(old))], new, rcond=None)[0].T
+        agree = _same(_moved(change, old), new, _size(new)) and _same(_moved(change, then), now, _size(now))
+        if agree and np.linalg.det(change[:3, :3]) > 0.0:
+            return change
+    return None
+
+
+def _rebase(cage: bpy.types.Object, change: Matrix4, depsgraph: bpy.types.Depsgraph) -> None:
+    """Bring all that the rig keeps in rig space to the armature's present space."""
+    settings = cage.cage_rig
+    for owner in (settings, *settings.skins):
+        if owner.snapshot is not None:
+            if owner.snapshot.users > 1:  # a duplicate of the character has it too
+                owner.snapshot = owner.snapshot.copy()
+            positions.write_base(owner.snapshot, positions.apply_matrix(change, positions.read_base(owner.snapshot)))
+    for skin in settings.skins:
+        skin.skin_to_rig = (change @ np.array(skin.skin_to_rig, np.float64)).T.tolist()
+    settings.cage_to_rig = (change @ np.array(settings.cage_to_rig, np.float64)).T.tolist()
+    for joint in settings.joints:
+        joint.head, joint.tail = _moved(change, np.array([joint.head, joint.tail], np.float64))
+        joint.shift = change[:3, :3] @ np.array(joint.shift, np.float64)
+    settings.bind_id = uuid.uuid4().hex
+    binding.mark(cage)
+    for obj in (settings.posed_cage, settings.refit_armature):
+        if obj is not None and obj.parent == settings.armature:
+            _put_back(obj, _from_bones(obj, depsgraph))
+
+
+def posed_has_stayed(
+    cage: bpy.types.Object, before: positions.Points, posed: positions.Points, depsgraph: bpy.types.Depsgraph
+) -> bool:
+    """Whether the posed cage's points are where they were because its origin was set; then the object is put back."""
+    obj = cage.cage_rig.posed_cage
+    if obj.data.is_editmode or obj.parent is None or is_flat(_world(obj.parent, depsgraph)):
+        return False
+    place = _from_bones(obj, depsgraph)
+    if np.allclose(place, np.eye(4), atol=1e-6):
+        return False
+    if not _same(_moved(place, posed.astype(np.float64)), before.astype(np.float64), _size(before)):
+        return False
+    _put_back(obj, place)
+    return True
+
+
+def _from_bones(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix4:
+    """Where a child of the armature is in rig space."""
+    return np.linalg.inv(_world(obj.parent, depsgraph)) @ _world(obj, depsgraph)
+
+
+def _put_back(obj: bpy.types.Object, place: Matrix4) -> None:
+    """Let the object's space be rig space again, its points where they are."""
+    obj.data.transform(Matrix(place))
+    obj.matrix_parent_inverse.identity()
+    obj.matrix_basis.identity()
