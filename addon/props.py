@@ -122,6 +122,14 @@ class CageRigSettings(bpy.types.PropertyGroup):
         options={"ANIMATABLE", "LIBRARY_EDITABLE"},
         override=OVERRIDABLE,
     )
+    half_weights: BoolProperty(
+        name="16-Bit Weights",
+        description="For large characters: what the cage moves is computed in half of the memory and faster. "
+        "Positions are off by no more than 0.02 % of the cage's movement",
+        update=_tag,
+        options={"LIBRARY_EDITABLE"},
+        override=OVERRIDABLE,
+    )
     input: PointerProperty(
         type=bpy.types.Object,
         name="Input",

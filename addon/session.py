@@ -109,6 +109,7 @@ class Session:
         self.starts = _starts(skins)
         self.rig = cage_rig_core.CoupledRig(**_to_core(snapshot)) if job is None else job.result()
         self.influence = 1.0
+        self._half_weights = False
         self.revision = 0  # grows whenever a result may have changed
         self._buffers = [np.empty((count, 3), np.float32) for count in counts]
         self._offsets: list[Points | None] = [None] * len(skins)
@@ -160,6 +161,13 @@ class Session:
         """Choose how bones deform the skin, one of the core's `skinning_methods()`; free where it is so already."""
         if name != self.rig.method:
             self.rig.set_method(name)
+            self.revision += 1
+
+    @_door
+    def keep_half_weights(self, half: bool) -> None:
+        """Keep the cage's weights in 16 bits, or not; free where it is so already."""
+        if half != self._half_weights:
+            self.rig.half_weights = self._half_weights = half
             self.revision += 1
 
     @_door

@@ -230,6 +230,7 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
     later = event is Event.RESTORED or choosing.is_by_hand(cage) or choosing.progress(cage) is not None
     later &= depsgraph.mode == "VIEWPORT" and not _rendering
     choosing.use(cage, session, shown.method.lower(), later=later)
+    session.keep_half_weights(settings.half_weights)
     rest = _read_rest_cage(cage, running, depsgraph)
     if len(rest) != len(session.snapshot.cage):
         raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")

@@ -42,6 +42,7 @@ LABELS: dict[str, tuple[str, str, str]] = {
     "Dual Quaternion": ("Duale Quaternionen", "Quaternions duaux", "Cuaterniones duales"),
     "Centers of Rotation": ("Drehzentren", "Centres de rotation", "Centros de rotación"),
     "Influence": ("Einfluss", "Influence", "Influencia"),
+    "16-Bit Weights": ("16-Bit-Gewichte", "Poids 16 bits", "Influencias de 16 bits"),
     "Mask": ("Maske", "Masque", "Máscara"),
     "Weights": ("Gewichte", "Poids", "Influencias"),
     "Opacity": ("Deckkraft", "Opacité", "Opacidad"),

@@ -134,7 +134,10 @@ class _Rig:
         column.operator("cage_rig.rebind", icon="FILE_REFRESH")
         column.operator("cage_rig.unbind", icon="UNLINKED")
         column.separator()
-        loaded = rig_of(context.object).cage_rig.coordinates
+        settings = rig_of(context.object).cage_rig
+        column.prop(settings, "half_weights")
+        column.separator()
+        loaded = settings.coordinates
         column.label(text=f"Coordinates: {loaded or 'Mean Value'}")
         row = column.row(align=True)
         row.operator("cage_rig.load_coordinates", text="Load")

@@ -169,6 +169,7 @@ class CoupledRig:
     def start_method(self, name: str) -> MethodJob: ...
     @property
     def method(self) -> str: ...
+    half_weights: bool  # frames keep weights of the cage in 16 bits; at any time
     def posed_skins(
         self,
         cages: ArrayLike,  # (#F, #C, 3), or (#C, 3) for a still cage

@@ -104,3 +104,25 @@ def test_cor_keeps_the_volume_of_a_bend_without_a_bulge(bar: Rig) -> None:
     fat_key(bar, value=0.7)
     assert np.isfinite(shown(bar.skin)).all()
     assert bar.settings.state == "LIVE"
+
+
+@pytest.mark.parametrize("method", ["LBS", "COR"])
+def test_16_bit_weights_change_at_any_time(bar: Rig, method: str, tmp_path: Path) -> None:
+    use(bar, method)
+    bend(bar, 1.2)
+    moved = np.abs(rest(bar.cage) * (0.2, 0.6, 0.6)).max()
+    fat_key(bar)
+    single, posed = shown(bar.skin).copy(), rest(bar.posed)
+    bar.settings.half_weights = True
+    update()
+    half = shown(bar.skin).copy()
+    assert 0 < np.abs(half - single).max() <= 2e-4 * moved
+    assert np.array_equal(rest(bar.posed), posed)
+    assert np.abs(fresh(bar)[0] - half).max() < 1e-6
+    path = str(tmp_path / "bar.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert np.abs(shown(bpy.data.objects["Bar"]) - half).max() < 1e-6
+    bpy.data.objects["BarCage"].cage_rig.half_weights = False
+    update()
+    assert np.abs(shown(bpy.data.objects["Bar"]) - single).max() < 1e-6

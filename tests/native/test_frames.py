@@ -76,3 +76,6 @@ def test_16_bit_weights_stay_near(bar, bent):
     moved = np.abs(cages[2] - bar["cage_vertices"]).max()
     assert 0 < np.abs(half - single).max() <= 2e-4 * moved + 1e-6 * rigs[0].size
     np.testing.assert_allclose(rigs[1].cage_coords, rigs[0].cage_coords, atol=0)
+    assert [rig.half_weights for rig in rigs] == [False, True]
+    rigs[0].half_weights = True
+    np.testing.assert_array_equal(played(rigs[0], cages[2], transforms[2]), half)

@@ -3,7 +3,7 @@
 mod common;
 
 use cage_rig::skinning::METHODS;
-use cage_rig::{CoupledRig, Point, Transform};
+use cage_rig::{CoupledRig, Point, Precision, Transform};
 use common::random::{self, Recipe};
 use common::{lively_pose, nudged, Fixture};
 use stats_alloc::{Region, StatsAlloc, INSTRUMENTED_SYSTEM};
@@ -42,7 +42,10 @@ fn frames_allocate_nothing_after_the_first_one() {
     for method in METHODS {
         let mut rig = small.rig();
         rig.set_method(method);
-        assert_eq!(allocations(&mut rig, &frames), 0, "{}", method.name);
+        for precision in [Precision::Half, Precision::Single] {
+            rig.set_precision(precision);
+            assert_eq!(allocations(&mut rig, &frames), 0, "{} {precision:?}", method.name);
+        }
         // A drag keeps its columns: only its first step allocates.
         let mut dragged = frames[11].clone();
         let region_of = |rig: &mut CoupledRig, dragged: &mut (Vec<Point>, Vec<Transform>)| {

@@ -86,7 +86,7 @@ fn read_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOptions> {
     Ok(options)
 }
 
-fn precision(half: bool) -> Precision {
+pub(crate) fn precision(half: bool) -> Precision {
     if half {
         Precision::Half
     } else {

@@ -4,11 +4,11 @@
 use crate::arrays::{self, Out};
 use crate::bones::Bones;
 use crate::errors::{CageRigError, OrRaise};
-use crate::input::{read_input, Given, Meshes};
+use crate::input::{precision, read_input, Given, Meshes};
 use crate::jobs::MethodJob;
 use cage_rig::sync::rest_centers::RestCenters;
 use cage_rig::sync::{Carried, Frame};
-use cage_rig::Point;
+use cage_rig::{Point, Precision};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -183,6 +183,17 @@ impl CoupledRig {
     fn set_method(&self, py: Python<'_>, name: &str) -> PyResult<()> {
         let method = cage_rig::skinning::method(name).or_raise()?;
         self.with(py, |rig| rig.set_method(method))
+    }
+
+    /// Whether frames keep Φ and Λ in 16 bits: less memory, faster, off by at most 2e-4 of the cage's movement.
+    #[getter]
+    fn half_weights(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |rig| rig.precision() == Precision::Half)
+    }
+
+    #[setter]
+    fn set_half_weights(&self, py: Python<'_>, half: bool) -> PyResult<()> {
+        self.with(py, |rig| rig.set_precision(precision(half)))
     }
 
     /// Begins to change the method; the rig keeps the one that it has until the job's result() is called.

@@ -1,6 +1,6 @@
 //! Points turned apart: what a product is added to, as its sums come.
 
-use super::strips::Single;
+use super::singles::Single;
 use super::PANEL;
 
 /// x, y and z of 32 points, then of the next ones; `#rows by 3`.

@@ -7,16 +7,18 @@
 //! small ones as the multipliers. Bakes, which know their frames in advance, make four of them of one walk.
 
 mod apart;
-mod strips;
+mod halves;
+mod singles;
 #[cfg(test)]
 mod tests;
 
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
-use crate::simd::{Kernel, Lanes, Path};
+use crate::simd::{Kernel, Lanes, Path, Vector};
 pub(crate) use apart::Apart;
+use halves::{Half, HalfMoves, Pair};
 use rayon::prelude::*;
-use strips::{halves, pack_half, pack_single, singles, Half, Single, Strips};
+use singles::{Single, SingleMoves};
 
 /// Rows of a panel.
 const PANEL: usize = 32;
@@ -33,7 +35,7 @@ pub enum Precision {
     /// Single precision.
     #[default]
     Single,
-    /// 16 bits, half of the memory: faster where the matrix is larger than the caches.
+    /// 16 bits, half of the memory and fewer instructions; errors below 2e-4 of the movement.
     Half,
 }
 
@@ -47,6 +49,7 @@ pub(crate) struct Panels {
 #[derive(Debug, Clone)]
 enum Numbers {
     Single(Vec<Single>),
+    /// Two columns a strip, and the scales of panels.
     Half(Vec<Half>, Vec<f32>),
 }
 
@@ -55,6 +58,29 @@ enum Numbers {
 pub(crate) struct Step<const F: usize = 1> {
     pub(crate) column: usize,
     pub(crate) by: [[f32; 3]; F],
+}
+
+/// What moves, in memory that products use again.
+#[derive(Debug, Clone)]
+pub(crate) struct Steps<const F: usize = 1> {
+    moved: Vec<Step<F>>,
+    /// The same for panels in 16 bits, and what it is multiples of.
+    pairs: Vec<Pair<F>>,
+    units: [[f32; 3]; F],
+}
+
+impl<const F: usize> Default for Steps<F> {
+    fn default() -> Self {
+        Self { moved: Vec::new(), pairs: Vec::new(), units: [[0.0; 3]; F] }
+    }
+}
+
+impl<const F: usize> Steps<F> {
+    /// Takes what moves now in the place of what did.
+    pub(crate) fn set(&mut self, moved: impl Iterator<Item = Step<F>>) {
+        self.moved.clear();
+        self.moved.extend(moved);
+    }
 }
 
 /// What a product is added to, and by how much each row takes part in it.
@@ -78,19 +104,19 @@ impl Panels {
         let of = |panel: usize| panel * PANEL..rows.min((panel + 1) * PANEL);
         let numbers = match precision {
             Precision::Single => {
-                let mut strips = singles(panels * columns);
+                let mut strips = vec![Single::ZERO; panels * columns];
                 strips.par_chunks_mut(columns.max(1)).enumerate().try_for_each(|(panel, strips)| {
-                    pack_single(matrix, of(panel), strips);
+                    singles::pack(matrix, of(panel), strips);
                     shares.step(1)
                 })?;
                 Numbers::Single(strips)
             }
             Precision::Half => {
-                let (mut strips, mut scales) = halves(panels * columns);
-                let strips_of = strips.par_chunks_mut(columns.max(1));
-                let both = strips_of.zip(scales.par_chunks_mut(columns.max(1)));
-                both.enumerate().try_for_each(|(panel, (strips, scales))| {
-                    pack_half(matrix, of(panel), strips, scales);
+                let pairs = columns.div_ceil(2);
+                let (mut strips, mut scales) = (vec![Half::ZERO; panels * pairs], vec![0.0; panels]);
+                let both = strips.par_chunks_mut(pairs.max(1)).zip(&mut scales);
+                both.enumerate().try_for_each(|(panel, (strips, scale))| {
+                    *scale = halves::pack(matrix, of(panel), strips);
                     shares.step(1)
                 })?;
                 Numbers::Half(strips, scales)
@@ -99,24 +125,33 @@ impl Panels {
         Ok(Self { columns, numbers })
     }
 
+    pub(crate) fn precision(&self) -> Precision {
+        match self.numbers {
+            Numbers::Single(..) => Precision::Single,
+            Numbers::Half(..) => Precision::Half,
+        }
+    }
+
     /// The columns named by `chosen`, in that order.
     pub(crate) fn select(&self, chosen: &[usize]) -> Self {
-        fn of<T: Copy>(strips: &[T], columns: usize, chosen: &[usize]) -> Vec<T> {
-            let panels = strips.chunks_exact(columns.max(1));
-            panels.flat_map(|panel| chosen.iter().map(|&k| panel[k])).collect()
-        }
         let numbers = match &self.numbers {
-            Numbers::Single(strips) => Numbers::Single(of(strips, self.columns, chosen)),
+            Numbers::Single(strips) => {
+                let panels = strips.chunks_exact(self.columns.max(1));
+                Numbers::Single(panels.flat_map(|panel| chosen.iter().map(|&k| panel[k])).collect())
+            }
             Numbers::Half(strips, scales) => {
-                Numbers::Half(of(strips, self.columns, chosen), of(scales, self.columns, chosen))
+                let panels = strips.chunks_exact(self.columns.div_ceil(2).max(1));
+                let strips = panels.flat_map(|panel| halves::select(panel, chosen)).collect();
+                Numbers::Half(strips, scales.clone())
             }
         };
         Self { columns: chosen.len(), numbers }
     }
 
     /// Writes `from` + mask · (matrix · `steps`) + offsets, `#rows by 3`.
-    pub(crate) fn write(&self, product: &Product, steps: &[Step], out: &mut [[f32; 3]]) {
-        if out.len() * steps.len() < PARALLEL_FROM {
+    pub(crate) fn write(&self, product: &Product, steps: &mut Steps, out: &mut [[f32; 3]]) {
+        let steps = self.rounded(steps);
+        if out.len() * steps.moved.len() < PARALLEL_FROM {
             product.path.run(Write { panels: self, product, first: 0, steps, out: [out] });
             return;
         }
@@ -130,10 +165,11 @@ impl Panels {
     pub(crate) fn write_frames(
         &self,
         product: &Product,
-        steps: &[Step<FRAMES>],
+        steps: &mut Steps<FRAMES>,
         [a, b, c, d]: [&mut [[f32; 3]]; FRAMES],
     ) {
-        if a.len() * steps.len() * FRAMES < PARALLEL_FROM {
+        let steps = self.rounded(steps);
+        if a.len() * steps.moved.len() * FRAMES < PARALLEL_FROM {
             product.path.run(Write { panels: self, product, first: 0, steps, out: [a, b, c, d] });
             return;
         }
@@ -145,6 +181,13 @@ impl Panels {
             product.path.run(Write { panels: self, product, first, steps, out: [a, b, c, d] });
         });
     }
+
+    fn rounded<'a, const F: usize>(&self, steps: &'a mut Steps<F>) -> &'a Steps<F> {
+        if self.precision() == Precision::Half {
+            steps.units = halves::round(&steps.moved, &mut steps.pairs);
+        }
+        steps
+    }
 }
 
 /// Rows of a product from row `first` on, the first of a panel.
@@ -152,19 +195,23 @@ struct Write<'a, const F: usize> {
     panels: &'a Panels,
     product: &'a Product<'a>,
     first: usize,
-    steps: &'a [Step<F>],
+    steps: &'a Steps<F>,
     out: [&'a mut [[f32; 3]]; F],
 }
 
 impl<const F: usize> Kernel for Write<'_, F> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
-        let (columns, panel) = (self.panels.columns, self.first / PANEL);
+        let (columns, first, steps) = (self.panels.columns, self.first / PANEL, self.steps);
         match &self.panels.numbers {
-            Numbers::Single(strips) => self.of(lanes, |p| &strips[(panel + p) * columns..][..columns]),
-            Numbers::Half(strips, scales) => self.of(lanes, |p| {
-                let of = (panel + p) * columns;
-                (&strips[of..][..columns], &scales[of..][..columns])
+            Numbers::Single(strips) => self.of(lanes, |panel, f| {
+                let strips = &strips[(first + panel) * columns..][..columns];
+                SingleMoves { strips, steps: &steps.moved, f }
+            }),
+            Numbers::Half(strips, scales) => self.of(lanes, |panel, f| {
+                let pairs = columns.div_ceil(2);
+                let (strips, scale) = (&strips[(first + panel) * pairs..][..pairs], scales[first + panel]);
+                HalfMoves { strips, scale, pairs: &steps.pairs, units: &steps.units, f }
             }),
         }
     }
@@ -172,10 +219,10 @@ impl<const F: usize> Kernel for Write<'_, F> {
 
 impl<const F: usize> Write<'_, F> {
     #[inline(always)]
-    fn of<L: Lanes, S: Strips>(self, lanes: L, panel: impl Fn(usize) -> S) {
-        let Self { product, first, steps, mut out, .. } = self;
+    fn of<L: Lanes, M: Moves>(self, lanes: L, moves: impl Fn(usize, usize) -> M) {
+        let Self { product, first, mut out, .. } = self;
         for (p, start) in (0..out[0].len()).step_by(PANEL).enumerate() {
-            let (strips, row) = (panel(p), first + start);
+            let row = first + start;
             let count = PANEL.min(out[0].len() - start);
             let from = product.from.panel(row / PANEL);
             let mut padded = [0.0; PANEL];
@@ -188,13 +235,13 @@ impl<const F: usize> Write<'_, F> {
             });
             for (f, out) in out.iter_mut().enumerate() {
                 // After the first frame the panel is in the first cache.
-                let moves = Moves { strips, steps, f, from, mask };
+                let rows = PanelRows { moves: moves(p, f), from, mask };
                 let out = &mut out[start..start + count];
                 if count == PANEL {
-                    moves.rows(lanes, out);
+                    rows.write(lanes, out);
                 } else {
                     let mut last = [[0.0; 3]; PANEL];
-                    moves.rows(lanes, &mut last);
+                    rows.write(lanes, &mut last);
                     out.copy_from_slice(&last[..count]);
                 }
                 if let Some(offsets) = product.offsets {
@@ -207,21 +254,27 @@ impl<const F: usize> Write<'_, F> {
     }
 }
 
-/// What rows of a panel are made of in frame `f`.
-struct Moves<'a, S, const F: usize> {
-    strips: S,
-    steps: &'a [Step<F>],
-    f: usize,
+/// A panel times what moves.
+trait Moves {
+    /// As many vectors of rows at once as sixteen registers hold the sums of, beside what is multiplied.
+    const AT_ONCE: usize;
+
+    /// x, y and z of `V` vectors of rows from `at` on.
+    fn sums<L: Lanes, const V: usize>(&self, lanes: L, at: usize) -> [[Vector<L>; V]; 3];
+}
+
+/// What rows of a panel are made of.
+struct PanelRows<'a, M> {
+    moves: M,
     from: &'a [Single; 3],
     mask: Option<&'a [f32]>,
 }
 
-impl<S: Strips, const F: usize> Moves<'_, S, F> {
+impl<M: Moves> PanelRows<'_, M> {
     #[inline(always)]
-    fn rows<L: Lanes>(&self, lanes: L, out: &mut [[f32; 3]]) {
-        // As many sums at once as there are registers for.
-        match L::F32_LANES {
-            16 => self.vectors::<L, 2>(lanes, out.as_flattened_mut()),
+    fn write<L: Lanes>(&self, lanes: L, out: &mut [[f32; 3]]) {
+        match M::AT_ONCE.min(PANEL / L::F32_LANES) {
+            2 => self.vectors::<L, 2>(lanes, out.as_flattened_mut()),
             _ => self.vectors::<L, 4>(lanes, out.as_flattened_mut()),
         }
     }
@@ -229,22 +282,9 @@ impl<S: Strips, const F: usize> Moves<'_, S, F> {
     /// `V` vectors of rows at a time.
     #[inline(always)]
     fn vectors<L: Lanes, const V: usize>(&self, lanes: L, out: &mut [f32]) {
-        let Self { strips, steps, f, from, mask } = *self;
+        let Self { moves, from, mask } = self;
         for at in (0..PANEL).step_by(V * L::F32_LANES) {
-            let zero = [lanes.splat_f32s(0.0); V];
-            let (mut x, mut y, mut z) = (zero, zero, zero);
-            for step in steps {
-                let (strip, [dx, dy, dz]) = (strips.strip(step.column), step.by[f]);
-                let dx = lanes.splat_f32s(S::scaled(&strip, dx));
-                let dy = lanes.splat_f32s(S::scaled(&strip, dy));
-                let dz = lanes.splat_f32s(S::scaled(&strip, dz));
-                for v in 0..V {
-                    let numbers = S::load(lanes, &strip, at + v * L::F32_LANES);
-                    x[v] = lanes.fused(numbers, dx, x[v]);
-                    y[v] = lanes.fused(numbers, dy, y[v]);
-                    z[v] = lanes.fused(numbers, dz, z[v]);
-                }
-            }
+            let [mut x, mut y, mut z] = moves.sums::<L, V>(lanes, at);
             for v in 0..V {
                 let row = at + v * L::F32_LANES;
                 if let Some(mask) = mask {

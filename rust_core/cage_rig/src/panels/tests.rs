@@ -1,6 +1,6 @@
 //! Products on every path, against sums in double precision.
 
-use super::{Apart, Panels, Precision, Product, Step, FRAMES, PANEL};
+use super::{Apart, Panels, Precision, Product, Step, Steps, FRAMES, PANEL};
 use crate::fixtures::{self, random::Random};
 use crate::progress::unwatched;
 use crate::rows::Rows;
@@ -29,6 +29,12 @@ fn points(count: usize, random: &mut Random) -> Vec<[f32; 3]> {
 fn steps<const F: usize>(columns: usize, random: &mut Random) -> Vec<Step<F>> {
     let by = |random: &mut Random| -> [f32; 3] { random.point().map(|x| x as f32).into() };
     (0..columns).map(|column| Step { column, by: std::array::from_fn(|_| by(random)) }).collect()
+}
+
+fn all<const F: usize>(moved: &[Step<F>]) -> Steps<F> {
+    let mut steps = Steps::default();
+    steps.set(moved.iter().copied());
+    steps
 }
 
 /// The largest error of a coordinate.
@@ -63,7 +69,7 @@ fn every_path_agrees_with_the_sums() {
                         offsets: offsets.map(|offsets| &offsets[..]),
                     };
                     let mut out = vec![[f32::NAN; 3]; rows];
-                    panels.write(&product, &steps, &mut out);
+                    panels.write(&product, &mut all(&steps), &mut out);
                     let error = error(&matrix, &product, &steps, &out);
                     assert!(error <= 1e-6, "{} {rows} by {columns}: {error:e}", path.name());
                 }
@@ -79,7 +85,11 @@ fn no_movement_is_exact() {
     let from = points(77, &mut random);
     for path in Path::available() {
         let mut out = vec![[f32::NAN; 3]; 77];
-        panels.write(&Product { path, from: &Apart::new(&from), mask: None, offsets: None }, &[], &mut out);
+        panels.write(
+            &Product { path, from: &Apart::new(&from), mask: None, offsets: None },
+            &mut Steps::default(),
+            &mut out,
+        );
         assert_eq!(out, from);
     }
 }
@@ -97,8 +107,8 @@ fn chosen_columns_are_those_of_the_matrix() {
         let alone: Vec<Step> =
             moved.iter().enumerate().map(|(column, step)| Step { column, ..*step }).collect();
         let mut out = [from.clone(), from.clone()];
-        panels.write(&product, &moved, &mut out[0]);
-        panels.select(&[2, 7]).write(&product, &alone, &mut out[1]);
+        panels.write(&product, &mut all(&moved), &mut out[0]);
+        panels.select(&[2, 7]).write(&product, &mut all(&alone), &mut out[1]);
         assert_eq!(out[0], out[1]);
     }
 }
@@ -116,15 +126,15 @@ fn threads_and_several_frames_change_no_bit() {
             let product = Product { path, from: &Apart::new(&from), mask: None, offsets: None };
             let mut frames = vec![from.clone(); FRAMES];
             let [a, b, c, d] = &mut frames[..] else { unreachable!("four frames") };
-            panels.write_frames(&product, &steps, [a, b, c, d]);
+            panels.write_frames(&product, &mut all(&steps), [a, b, c, d]);
             for (f, frame) in frames.iter().enumerate() {
                 let alone: Vec<Step> =
                     steps.iter().map(|s| Step { column: s.column, by: [s.by[f]] }).collect();
                 let mut out = from.clone();
-                panels.write(&product, &alone, &mut out);
+                panels.write(&product, &mut all(&alone), &mut out);
                 assert!(out == *frame, "{} frame {f}", path.name());
                 // The first rows alone are too few for threads.
-                panels.write(&product, &alone, &mut out[..640]);
+                panels.write(&product, &mut all(&alone), &mut out[..640]);
                 assert!(out[..640] == frame[..640], "{} frame {f}", path.name());
             }
         }
@@ -144,15 +154,42 @@ fn sixteen_bits_keep_displacements_and_what_moves_as_a_whole() {
         let whole: Vec<Step> = (0..columns).map(|column| Step { column, by: [[1.0, -2.0, 0.5]] }).collect();
         for path in Path::available() {
             let product = Product { path, from: &Apart::new(&from), mask: None, offsets: None };
-            panels.write(&product, &whole, &mut out);
+            panels.write(&product, &mut all(&whole), &mut out);
             let far = error(&matrix, &product, &whole, &out);
             assert!(far <= 2e-5 * 2.0, "{far:e}");
             for _ in 0..20 {
                 let steps = steps(columns, &mut random);
-                panels.write(&product, &steps, &mut out);
+                panels.write(&product, &mut all(&steps), &mut out);
                 let far = error(&matrix, &product, &steps, &out);
                 assert!(far <= 2e-4 * 3f64.sqrt(), "{} columns: {far:e}", columns);
             }
+        }
+    }
+}
+
+#[test]
+fn sixteen_bits_never_overflow() {
+    let mut random = Random::new(6);
+    let (rows, columns) = (64, 300);
+    let mut matrix = Rows::zeros(rows, columns);
+    for i in 0..rows {
+        matrix.row_mut(i).iter_mut().for_each(|x| *x = random.between(-1.0, 1.0));
+    }
+    let panels = packed(&matrix, Precision::Half);
+    let from = vec![[0.0; 3]; rows];
+    for i in 0..rows {
+        // The largest sum that this row can have, and the least.
+        let along = |column: usize| matrix.row(i)[column].signum() as f32;
+        let steps: Vec<Step> =
+            (0..columns).map(|column| Step { column, by: [[along(column), -along(column), 0.0]] }).collect();
+        let largest: f64 = matrix.row(i).iter().map(|x| x.abs()).sum();
+        for path in Path::available() {
+            let product = Product { path, from: &Apart::new(&from), mask: None, offsets: None };
+            let mut out = from.clone();
+            panels.write(&product, &mut all(&steps), &mut out);
+            let far = error(&matrix, &product, &steps, &out);
+            // Coarser than coordinates, whose rows sum to 1; a sum that left its bits would be off by more than itself.
+            assert!(far <= 1e-3 * largest, "{}: {far:e} of {largest}", path.name());
         }
     }
 }

@@ -4,6 +4,11 @@
 //! baseline, and calls a function for every instruction.
 
 use pulp::{Scalar128b, Simd};
+#[cfg(target_arch = "aarch64")]
+use {
+    pulp::{cast, f32x4, i32x4},
+    std::arch::aarch64::int16x4_t,
+};
 
 /// Most lanes that a vector has.
 const MOST: usize = 16;
@@ -44,12 +49,34 @@ pub(crate) trait Lanes: Simd {
         Self::as_mut_simd_f32s(&mut numbers[..Self::F32_LANES]).0[0] = vector;
     }
 
-    /// A vector of the first integers of `numbers`.
+    /// The first vector of `numbers`.
     #[inline(always)]
-    fn load_i16(self, numbers: &[i16]) -> Self::f32s {
-        let mut wide = [0.0; MOST];
-        wide.iter_mut().zip(&numbers[..Self::F32_LANES]).for_each(|(x, n)| *x = f32::from(*n));
-        self.load(&wide)
+    fn load_i32(self, numbers: &[i32]) -> Self::i32s {
+        Self::as_simd_i32s(&numbers[..Self::F32_LANES]).0[0]
+    }
+
+    /// `sum` and the two products of the 16-bit numbers of `a` with those of `b`.
+    #[inline(always)]
+    fn add_pairs(self, a: Self::i32s, b: Self::i32s, sum: Self::i32s) -> Self::i32s {
+        let mut lanes = [[0; MOST]; 3];
+        for (lanes, vector) in lanes.iter_mut().zip([a, b, sum]) {
+            Self::as_mut_simd_i32s(&mut lanes[..Self::F32_LANES]).0[0] = vector;
+        }
+        let [a, b, mut sum] = lanes;
+        for i in 0..Self::F32_LANES {
+            let (low, high) = (i32::from(a[i] as i16) * i32::from(b[i] as i16), (a[i] >> 16) * (b[i] >> 16));
+            sum[i] += low + high;
+        }
+        self.load_i32(&sum)
+    }
+
+    /// The numbers of `whole`.
+    #[inline(always)]
+    fn to_f32(self, whole: Self::i32s) -> Self::f32s {
+        let (mut from, mut to) = ([0; MOST], [0.0; MOST]);
+        Self::as_mut_simd_i32s(&mut from[..Self::F32_LANES]).0[0] = whole;
+        to.iter_mut().zip(from).for_each(|(x, n)| *x = n as f32);
+        self.load(&to)
     }
 
     /// x, y and z of the first points of `numbers`, three each.
@@ -115,5 +142,17 @@ impl Lanes for pulp::aarch64::Neon {
     #[inline(always)]
     fn short(self) -> Self {
         self
+    }
+
+    #[inline(always)]
+    fn add_pairs(self, a: i32x4, b: i32x4, sum: i32x4) -> i32x4 {
+        let ([a, c], [b, d]): ([int16x4_t; 2], [int16x4_t; 2]) = (cast!(a), cast!(b));
+        let (low, high) = (self.neon.vmull_s16(a, b), self.neon.vmull_s16(c, d));
+        self.add_i32s(sum, cast!(self.neon.vpaddq_s32(low, high)))
+    }
+
+    #[inline(always)]
+    fn to_f32(self, whole: i32x4) -> f32x4 {
+        cast!(self.neon.vcvtq_f32_s32(cast!(whole)))
     }
 }

@@ -4,8 +4,8 @@
 
 use super::Lanes;
 use pulp::x86::{V3, V4};
-use pulp::{cast, f32x16, f32x8};
-use std::arch::x86_64::{__m128i, __m256, __m256d};
+use pulp::{cast, f32x16, f32x8, i32x16, i32x8};
+use std::arch::x86_64::{__m256, __m256d};
 
 /// Four numbers below, four above.
 #[inline(always)]
@@ -25,11 +25,14 @@ impl Lanes for V3 {
     }
 
     #[inline(always)]
-    fn load_i16(self, numbers: &[i16]) -> f32x8 {
-        let mut narrow = [0i16; 8];
-        narrow.copy_from_slice(&numbers[..8]);
-        let narrow: __m128i = cast!(narrow);
-        cast!(self.avx._mm256_cvtepi32_ps(self.avx2._mm256_cvtepi16_epi32(narrow)))
+    fn add_pairs(self, a: i32x8, b: i32x8, sum: i32x8) -> i32x8 {
+        let products = self.avx2._mm256_madd_epi16(cast!(a), cast!(b));
+        cast!(self.avx2._mm256_add_epi32(cast!(sum), products))
+    }
+
+    #[inline(always)]
+    fn to_f32(self, whole: i32x8) -> f32x8 {
+        cast!(self.avx._mm256_cvtepi32_ps(cast!(whole)))
     }
 
     #[inline(always)]
@@ -95,10 +98,14 @@ impl Lanes for V4 {
     }
 
     #[inline(always)]
-    fn load_i16(self, numbers: &[i16]) -> f32x16 {
-        let short = self.short();
-        let halves: [f32x8; 2] = [short.load_i16(&numbers[..8]), short.load_i16(&numbers[8..])];
-        cast!(halves)
+    fn add_pairs(self, a: i32x16, b: i32x16, sum: i32x16) -> i32x16 {
+        let products = self.avx512bw._mm512_madd_epi16(cast!(a), cast!(b));
+        cast!(self.avx512f._mm512_add_epi32(cast!(sum), products))
+    }
+
+    #[inline(always)]
+    fn to_f32(self, whole: i32x16) -> f32x16 {
+        cast!(self.avx512f._mm512_cvtepi32_ps(cast!(whole)))
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@
 use super::skeleton_updater::JointMotion;
 use super::CoupledRig;
 use crate::error::PoseError;
-use crate::panels::{Step, FRAMES};
+use crate::panels::{Steps, FRAMES};
 use crate::points::{Point, Transform};
 use crate::skinning::SkinningInput;
 
@@ -18,7 +18,7 @@ pub type Frame<'a> = (&'a [Point], &'a [Transform]);
 pub(super) struct Ahead {
     skins: Vec<[f32; 3]>,
     centers: Vec<[f32; 3]>,
-    steps: Vec<Step>,
+    steps: Steps,
     motions: Vec<JointMotion>,
     joints: Vec<Point>,
     transforms: Vec<Transform>,

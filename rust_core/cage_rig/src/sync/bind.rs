@@ -138,7 +138,6 @@ pub struct Binding {
     pub(super) rest_skin: RestSkin,
     pub(super) frame_weights: FrameWeights,
     pub(super) path: Path,
-    precision: Precision,
     packed_weights: PackedWeights,
     skin_triangles: Vec<[u32; 3]>,
     center_options: CenterOptions,
@@ -218,7 +217,6 @@ impl Binding {
             rest_skin: RestSkin::new(&skin, cage.vertices(), &cage_coords, options.precision, &stages.frame)?,
             frame_weights: FrameWeights::new(&weights),
             path: options.path,
-            precision: options.precision,
             packed_weights: PackedWeights::new(&weights),
             skin_triangles: triangles,
             center_options: options.centers,
@@ -229,6 +227,11 @@ impl Binding {
             cage_coords,
             cage,
         })
+    }
+
+    /// Frames keep Φ so from now on.
+    pub(super) fn repack(&mut self, precision: Precision) {
+        self.rest_skin.repack(&self.cage_coords, precision);
     }
 
     /// Centers of rotation under Λ = Φ_CoR Φ, `#M by #C`.
@@ -255,14 +258,14 @@ impl Binding {
             (0..skin.len()).map(|i| Point::from_row_slice(&found.row(i)[columns..])).collect();
         let mut coords = Rows::zeros(skin.len(), columns);
         (0..skin.len()).for_each(|i| coords.row_mut(i).copy_from_slice(&found.row(i)[..columns]));
-        RestCenters::new(coords, &at_bind, self.cage.vertices(), self.precision, &packing)
+        RestCenters::new(coords, &at_bind, self.cage.vertices(), self.rest_skin.precision(), &packing)
     }
 
     /// Centers of rotation p₀ = Λ C₀ under a given Λ (`coords`, `#M by #C`).
     pub(super) fn given_centers(&self, coords: Rows, part: &Part) -> Result<RestCenters, Cancelled> {
         let cage = self.cage.vertices();
         let at_bind = coords.times(cage);
-        RestCenters::new(coords, &at_bind, cage, self.precision, part)
+        RestCenters::new(coords, &at_bind, cage, self.rest_skin.precision(), part)
     }
 }
 

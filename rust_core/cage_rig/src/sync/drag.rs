@@ -5,7 +5,7 @@
 //! once. Nothing is added to what a drag itself has made, so nothing drifts however long it is.
 
 use super::rest_skin::{Confines, RestSkin};
-use crate::panels::{Apart, Panels, Step};
+use crate::panels::{Apart, Panels, Step, Steps};
 use crate::points::{to_single, Point};
 
 /// A drag moves at most this part of the cage, and at most so many vertices.
@@ -24,7 +24,7 @@ pub enum Pass {
 /// Φ_K, C − C_b and M_b.
 pub(super) struct Columns<'a> {
     pub(super) panels: &'a Panels,
-    pub(super) steps: &'a [Step],
+    pub(super) steps: &'a mut Steps,
     pub(super) from: &'a Apart,
 }
 
@@ -38,7 +38,7 @@ pub struct Drag {
     /// C_b, M_b and Φ_K; none before a drag.
     near: Option<Near>,
     /// Of the present pass.
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Steps,
     /// Cage vertices that are elsewhere than in C_b.
     apart: Vec<usize>,
 }
@@ -55,7 +55,7 @@ struct Near {
 impl Drag {
     /// Of a skin that rests in `cage` (C₀, `#C by 3`).
     pub fn new(cage: &[Point]) -> Self {
-        Self { last: cage.to_vec(), plain: true, ..Self::default() }
+        Self { last: cage.to_vec(), plain: true, apart: Vec::with_capacity(MOST + 1), ..Self::default() }
     }
 
     /// What the kept skin was made under has changed: all is forgotten but the memory.
@@ -83,10 +83,9 @@ impl Drag {
         let near = self.near.as_mut()?;
         near.take_in(&self.apart, skin);
         let by = |&k: &usize| to_single(&(cage[k] - near.cage[k]));
-        self.steps.clear();
         let moved = near.moved.iter().enumerate();
-        self.steps.extend(moved.map(|(column, k)| Step { column, by: [by(k)] }));
-        Some(Columns { panels: &near.columns, steps: &self.steps, from: &near.skin })
+        self.steps.set(moved.map(|(column, k)| Step { column, by: [by(k)] }));
+        Some(Columns { panels: &near.columns, steps: &mut self.steps, from: &near.skin })
     }
 
     /// A drag from where the last pass ended, in the memory of the one before it.

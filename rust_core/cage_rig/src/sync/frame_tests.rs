@@ -148,6 +148,45 @@ fn every_path_and_precision_poses_alike() {
 }
 
 #[test]
+fn precision_can_be_changed_at_any_time() {
+    use crate::panels::Precision::{Half, Single};
+    let fixture = character();
+    let (cage, pose) = (fixtures::nudged(&fixture.cage, 0.3, 6), fixtures::lively_pose(&fixture, 0.7));
+    for method in METHODS {
+        let bound = |precision| {
+            let mut input = fixture.input();
+            (input.options.precision, input.method) = (precision, method);
+            let mut rig = CoupledRig::new(input).expect("the fixture binds");
+            rig.play(&cage, &pose, None).expect("a valid frame");
+            rig
+        };
+        let (mut single, mut half) = (bound(Single), bound(Half));
+        let mut rig = bound(Single);
+        for precision in [Half, Half, Single] {
+            let expected = if precision == Half { &mut half } else { &mut single };
+            rig.posed_skin();
+            rig.set_precision(precision);
+            assert_eq!(rig.precision(), precision);
+            assert!(rig.posed_skin() == expected.posed_skin(), "{} {precision:?}", method.name);
+            assert_eq!(rig.posed_cage(), expected.posed_cage());
+            // And of a drag.
+            let mut dragged = cage.clone();
+            dragged[3].x += 0.01;
+            for rig in [&mut rig, expected] {
+                rig.edit_rest_cage(&dragged).expect("a valid cage");
+                rig.posed_skin();
+                rig.edit_rest_cage(&cage).expect("a valid cage");
+            }
+            let far = fixtures::distance(
+                &fixtures::points(rig.posed_skin()),
+                &fixtures::points(expected.posed_skin()),
+            );
+            assert!(far <= FRAME * fixture.size(), "{far:e}");
+        }
+    }
+}
+
+#[test]
 fn posed_skins_are_what_playing_their_frames_shows() {
     let fixture = character();
     let mut random = Random::new(8);

@@ -45,6 +45,7 @@ pub use work::Work;
 
 use crate::cage::Cage;
 use crate::error::{CageError, Error, PoseError, SkinError};
+use crate::panels::Precision;
 use crate::points::{first_unusable, Matrix3, Point, Transform};
 use crate::progress::{unwatched, Cancelled, Part, Progress};
 use crate::rows::Rows;
@@ -238,6 +239,21 @@ impl CoupledRig {
         }
     }
 
+    /// How frames keep Φ and Λ from now on. Nothing else depends on it: anchors, cages and joints stay.
+    pub fn set_precision(&mut self, precision: Precision) {
+        if precision != self.precision() {
+            Arc::make_mut(&mut self.binding).repack(precision);
+            self.centers.iter_mut().for_each(|centers| centers.repack(precision));
+            self.buffers.drag.forget();
+            self.rest_skin_changed();
+        }
+    }
+
+    /// How frames keep Φ and Λ.
+    pub fn precision(&self) -> Precision {
+        self.binding.rest_skin.precision()
+    }
+
     /// The centers of rotation, where `method` is the first that needs them and they were not given.
     /// They can be integrated beside the rig, which goes on meanwhile with the method that it has.
     pub fn due_centers(&self, method: &SkinningMethod) -> Option<DueCenters> {
@@ -245,8 +261,10 @@ impl CoupledRig {
     }
 
     /// Takes what [`Self::due_centers`] gave, integrated.
-    pub fn take_centers(&mut self, centers: RestCenters) {
+    pub fn take_centers(&mut self, mut centers: RestCenters) {
         if self.centers.is_none() {
+            // It may have changed since they were due.
+            centers.repack(self.precision());
             self.centers = Some(centers);
             self.work.center_integrations += 1;
         }

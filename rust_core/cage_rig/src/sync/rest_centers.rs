@@ -42,6 +42,14 @@ impl RestCenters {
         &self.coords
     }
 
+    /// Keeps Λ in this precision.
+    pub(super) fn repack(&mut self, precision: Precision) {
+        if precision != self.mover.precision() {
+            self.mover.repack(&self.coords, precision);
+            self.forget();
+        }
+    }
+
     /// What moves the rest skin has changed.
     pub fn invalidate(&mut self) {
         self.stale = true;

@@ -4,9 +4,9 @@
 //! is in Φ, and only the columns of cage vertices that moved cost anything: `#M` per moved vertex.
 
 use super::drag::{Columns, Drag, Pass};
-use crate::panels::{Apart, Panels, Precision, Product, Step, FRAMES};
+use crate::panels::{Apart, Panels, Precision, Product, Step, Steps, FRAMES};
 use crate::points::{to_f32, to_single, Point};
-use crate::progress::{Cancelled, Part};
+use crate::progress::{unwatched, Cancelled, Part};
 use crate::rows::Rows;
 use crate::simd::Path;
 
@@ -43,6 +43,15 @@ impl RestSkin {
         Ok(Self { skin: Apart::new(&to_f32(skin)), cage: cage.to_vec(), coords })
     }
 
+    pub(super) fn precision(&self) -> Precision {
+        self.coords.precision()
+    }
+
+    /// Keeps Φ (`cage_coords`) in another precision.
+    pub(super) fn repack(&mut self, cage_coords: &Rows, precision: Precision) {
+        self.coords = unwatched(|part| Panels::new(cage_coords, precision, part));
+    }
+
     /// M₀, `#M by 3`.
     pub fn at_bind(&self) -> Vec<[f32; 3]> {
         self.skin.points()
@@ -74,13 +83,12 @@ impl RestSkin {
         &self,
         cage: &[Point],
         confines: &Confines,
-        steps: &mut Vec<Step>,
+        steps: &mut Steps,
         rest: &mut [[f32; 3]],
     ) {
         let Confines { path, mask, offsets } = *confines;
         let moved = cage.iter().zip(&self.cage).enumerate().filter(|(_, (c, c0))| c != c0);
-        steps.clear();
-        steps.extend(moved.map(|(column, (c, c0))| Step { column, by: [to_single(&(c - c0))] }));
+        steps.set(moved.map(|(column, (c, c0))| Step { column, by: [to_single(&(c - c0))] }));
         self.coords.write(&Product { path, from: &self.skin, mask, offsets }, steps, rest);
     }
 
@@ -90,7 +98,7 @@ impl RestSkin {
         &self,
         cages: &[&[Point]],
         confines: &Confines,
-        steps: &mut Vec<Step>,
+        steps: &mut Steps,
         rest: &mut [[f32; 3]],
     ) {
         let count = self.skin.len();
@@ -101,10 +109,14 @@ impl RestSkin {
         let cage_of = |frame: usize| cages[frame.min(cages.len() - 1)];
         let by = |frame: usize, k: usize| to_single(&(cage_of(frame)[k] - self.cage[k]));
         let moved = (0..self.cage.len()).filter(|&k| cages.iter().any(|cage| cage[k] != self.cage[k]));
-        let steps: Vec<Step<FRAMES>> =
-            moved.map(|column| Step { column, by: std::array::from_fn(|f| by(f, column)) }).collect();
+        let mut steps = Steps::<FRAMES>::default();
+        steps.set(moved.map(|column| Step { column, by: std::array::from_fn(|f| by(f, column)) }));
         let (ab, cd) = rest.split_at_mut(2 * count);
         let ((a, b), (c, d)) = (ab.split_at_mut(count), cd.split_at_mut(count));
-        self.coords.write_frames(&Product { path, from: &self.skin, mask, offsets }, &steps, [a, b, c, d]);
+        self.coords.write_frames(
+            &Product { path, from: &self.skin, mask, offsets },
+            &mut steps,
+            [a, b, c, d],
+        );
     }
 }
