@@ -120,10 +120,10 @@ def _cage_problem(cage: bpy.types.Object) -> str:
         return Problem(sentence, "rebind")
     for obj in (cage, settings.posed_cage):
         if obj.data.is_editmode:
-            count, bound = positions.edit_vertex_count(obj.data), len(settings.snapshot.vertices)
+            same = positions.edit_vertex_count(obj.data) == len(settings.snapshot.vertices)
         else:
-            count, bound = positions.topology(obj.data), positions.topology(settings.snapshot)
-        if count != bound:
+            same = positions.same_faces(obj.data, settings.snapshot)
+        if not same:
             sentence = f"'{obj.name}' has other vertices or faces than when it was bound; undo, or press Rebind"
             return Problem(sentence, "rebind")
     return ""

@@ -271,7 +271,7 @@ class CageRigGenerated(bpy.types.PropertyGroup):
     detail: FloatProperty()
     symmetry: BoolProperty(default=True)
     hull: BoolProperty()
-    like: PointerProperty(type=bpy.types.Object, name="Like", description="Whose cross sections and faces it has")
+    like: StringProperty(name="Like", description="The cage whose cross sections and faces it has; see caging.like_of")
     arrangement: StringProperty(description="Of the arcs of the skeleton, where they are in another cage's order")
 
 

@@ -99,6 +99,20 @@ def read_faces(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int3
     return corners, sizes
 
 
+def same_faces(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+    """Whether both have faces between the same vertices, in whatever order. Not in Edit Mode."""
+    return topology(mesh) == topology(other) and np.array_equal(_names(mesh), _names(other))
+
+
+def _names(mesh: bpy.types.Mesh) -> NDArray[np.int64]:
+    """A number for each face, sorted: that of its vertices, whichever comes first and whichever way round."""
+    corners, sizes = read_faces(mesh)
+    if not len(sizes):
+        return sizes.astype(np.int64)
+    vertices = corners.astype(np.int64) + 1
+    return np.sort(np.add.reduceat(vertices**3 + 7919 * vertices, np.cumsum(sizes) - sizes))
+
+
 def new_mesh(name: str, points: Points, faces: tuple[NDArray[np.int32], NDArray[np.int32]]) -> bpy.types.Mesh:
     """A new mesh datablock from `#V by 3` points and (corners, sizes) faces, corners kept in order."""
     mesh = bpy.data.meshes.new(name)

@@ -51,13 +51,18 @@ def corners_of(cage: bpy.types.Object) -> int:
 
 def cages(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The scene's generated cages."""
-    return [obj for obj in scene.objects if obj.type == "MESH" and sections_of(obj) is not None]
+    return [obj for obj in scene.objects if is_generated(obj)]
+
+
+def is_generated(obj: bpy.types.Object) -> bool:
+    """Whether the object is a generated cage, as far as its vertices know their cross sections."""
+    return obj.type == "MESH" and sections_of(obj) is not None
 
 
 def suggested(scene: bpy.types.Scene, cage: bpy.types.Object) -> list[bpy.types.Object]:
     """Other cages of the scene around bones of the same names, whose faces this one could have and has not."""
     own, found = _bones(cage), []
-    for other in cages(scene) if cage.type == "MESH" and sections_of(cage) is not None else ():
+    for other in cages(scene) if is_generated(cage) else ():
         shared = own & _bones(other)
         if other != cage and len(shared) >= FEW and len(shared) >= SHARED * len(own) and not same_faces(cage, other):
             found.append(other)

@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from ..adapters import positions, vertex_groups
 from ..generator import Cage, Earlier, Points
-from .alike import SECTION, same_faces, sections_of
+from .alike import SECTION, is_generated, same_faces, sections_of
 from .character import Character
 from .course import OnBone
 from .options import Options
@@ -21,7 +21,7 @@ from .refusals import GenerateError
 
 def refuse_cage(cage: bpy.types.Object, like: bpy.types.Object | None = None) -> None:
     """Raise `GenerateError` where this object can't get a new cage in place of its own."""
-    if cage == like:
+    if cage == like != like_of(cage):
         raise GenerateError(f"'{cage.name}' can't be like itself; choose another cage for Like, or none")
     if cage.cage_rig.state != "NONE":
         raise GenerateError(f"'{cage.name}' is bound; Unbind it, generate it anew, and bind it again")
@@ -96,7 +96,10 @@ def _remember(cage: bpy.types.Object, character: Character, options: Options, no
         kept.skins.add().object = skin
     for name, value in vars(options).items():
         setattr(kept, name, value)
-    kept.like = character.model and character.model.cage
+    if character.model is None:
+        kept.like = ""
+    elif character.model.cage != cage:
+        kept.like = character.model.cage.name
     kept.own_nodes = nodes is not None
     kept.nodes.clear()
     for node in nodes or ():
@@ -125,9 +128,19 @@ def nodes_of(cage: bpy.types.Object) -> list[OnBone] | None:
 
 
 def like_of(cage: bpy.types.Object) -> bpy.types.Object | None:
-    """The cage that this one is like, if it is still there."""
-    like = cage.cage_rig_generated.like
-    return like if like is not None and like.users_scene else None
+    """The cage that this one is like; None where it has faces of its own.
+
+    A name is remembered, so that the other character does not come along where this one is appended. Where it is
+    renamed, or in another file, a cage with the same faces stands in, and at last this one, which has them.
+    """
+    name = cage.cage_rig_generated.like
+    if not name:
+        return None
+    other = bpy.data.objects.get(name)
+    if other is not None and other.users_scene and is_generated(other):
+        return other
+    others = (obj for obj in bpy.data.objects if obj != cage and obj.users_scene and is_generated(obj))
+    return next((obj for obj in others if same_faces(cage, obj)), cage)
 
 
 def earlier(cage: bpy.types.Object, character: Character, options: Options) -> Earlier | None:
@@ -137,7 +150,7 @@ def earlier(cage: bpy.types.Object, character: Character, options: Options) -> E
         before = replace(before, placement=options.placement)  # nothing was placed
     kept, owners = cage.cage_rig_generated, sections_of(cage)
     known = kept.fingerprint == character.generator.given.fingerprint
-    known &= character.model is None or character.model.cage == kept.like
+    known &= character.model is None or character.model.cage == like_of(cage)
     if not known or before.core() != options.core() or owners is None:
         return None
     if not np.array_equal(owners, np.repeat(np.arange(len(owners) // options.corners), options.corners)):
@@ -158,8 +171,9 @@ def summary(cage: bpy.types.Object, made: Cage, notes: list[str]) -> str:
         f"'{cage.name}': {len(made.points)} vertices in {len(made.sections)} cross sections, {quads} quads and "
         f"{triangles} triangles, {made.report['volume_ratio']:.2f} times the volume of what it encloses"
     )
-    if cage.cage_rig_generated.like is not None and same_faces(cage, cage.cage_rig_generated.like):
-        text += f", with the faces of '{cage.cage_rig_generated.like.name}'"
+    other = like_of(cage)
+    if other not in (None, cage) and same_faces(cage, other):
+        text += f", with the faces of '{other.name}'"
     if made.report["kept_vertices"]:
         text += f"; {made.report['kept_vertices']} vertices are where they were"
     return ". ".join([text, *notes])

@@ -7,7 +7,22 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from scene import Rig, bend, bind, bound_bar, build_bar, fat_key, native, rest, select, set_mesh, shown, update
+from scene import (
+    Rig,
+    bend,
+    bind,
+    bound_bar,
+    build_bar,
+    enter_edit_mode,
+    fat_key,
+    leave_edit_mode,
+    native,
+    rest,
+    select,
+    set_mesh,
+    shown,
+    update,
+)
 
 
 def assert_paused_and_plain(rig: Rig, word: str) -> None:
@@ -244,6 +259,28 @@ def test_subdivision_on_the_cage_pauses_until_it_is_off(bar: Rig) -> None:
     modifier.show_viewport = False
     update()
     assert bar.settings.state == "LIVE"
+
+
+@pytest.mark.parametrize("part", ["cage", "posed"])
+def test_vertices_in_another_order_pause(bar: Rig, part: str) -> None:
+    obj = getattr(bar, part)
+    enter_edit_mode(obj)
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.sort_elements(type="RANDOMIZE", elements={"VERT"}, seed=3)
+    leave_edit_mode()
+    assert bar.settings.state == "PAUSED" and bar.settings.fix == "rebind"
+    assert f"'{obj.name}' has other vertices or faces" in bar.settings.message
+
+
+def test_flipped_or_sorted_faces_change_nothing(bar: Rig) -> None:
+    bend(bar, 0.7)
+    before = shown(bar.skin).copy()
+    enter_edit_mode(bar.cage)
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.flip_normals()
+    bpy.ops.mesh.sort_elements(type="REVERSE", elements={"FACE"})
+    leave_edit_mode()
+    assert bar.settings.state == "LIVE" and np.array_equal(shown(bar.skin), before)
 
 
 def test_removed_modifier_pauses(bar: Rig) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import ModuleType
 
 import bmesh
@@ -105,9 +106,34 @@ def test_the_button_makes_it_and_the_cage_remembers_it(
     assert bpy.context.object == cage
     assert faces(cage) == faces(like) and not np.array_equal(points(cage), shape)
     is_good(cage, fine)
+    wanted, like.name = faces(like), "Renamed"
+    assert caging.like_of(cage) == like, "it has the same faces"
     bpy.data.objects.remove(like)
-    assert caging.like_of(cage) is None
-    assert bpy.ops.cage_rig.generate_cage(clearance=0.002) == {"FINISHED"}, "its own faces again"
+    assert caging.like_of(cage) == cage
+    for clearance in (0.002, 0.003):
+        assert bpy.ops.cage_rig.generate_cage(clearance=clearance) == {"FINISHED"}
+        assert faces(bpy.context.object) == wanted, "it still has them, without the other one"
+    assert bpy.ops.cage_rig.generate_cage(like="", clearance=0.002) == {"FINISHED"}
+    assert faces(bpy.context.object) != wanted and caging.like_of(bpy.context.object) is None, "its own again"
+
+
+def test_an_appended_cage_leaves_the_other_character_behind(
+    caging: ModuleType, like: bpy.types.Object, fine: uncaged.Uncaged, tmp_path: Path
+) -> None:
+    cage = caging.generate_cage(bpy.context, *fine, like=like)
+    name, wanted, count = cage.name, faces(cage), len(bpy.data.objects)
+    nodes = caging.nodes_of(cage)
+    path = str(tmp_path / "two.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.append(directory=f"{path}/Object/", filename=name)
+    assert 0 < len(bpy.data.objects) == count // 2
+    cage = bpy.data.objects[name]
+    kept = cage.cage_rig_generated
+    moved = [node._replace(position=node.position + 0.05) if "leg" in node.bone else node for node in nodes]
+    skins = [item.object for item in kept.skins]
+    assert caging.generate_cage(bpy.context, skins, kept.armature, nodes=moved, cage=cage) == cage
+    assert faces(cage) == wanted
 
 
 def test_a_cage_that_could_have_the_faces_of_another_one_says_so(

@@ -95,12 +95,12 @@ def choose_like(template: str) -> Iterator[float | None]:
     for _ in range(150):
         yield 0.2
         cage = bpy.context.object
-        if cage is not None and cage.name != template and cage.cage_rig_generated.like is not None:
+        if cage is not None and cage.name != template and cage.cage_rig_generated.like:
             break
     yield LOOK
     driver.screenshot("4_alike")
     cage, other = bpy.context.object, bpy.data.objects[template]
-    driver.check("the field names the other cage", cage.cage_rig_generated.like == other, cage.cage_rig_generated.like)
+    driver.check("the field names the other cage", cage.cage_rig_generated.like == template, template)
     driver.check("the faces are the same, index for index", faces(cage) == faces(other))
     operator = bpy.context.window_manager.operators[-1]
     driver.check("the panel shows it", operator.like == template, operator.like)
