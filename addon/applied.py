@@ -46,6 +46,6 @@ def _leave(obj: bpy.types.Object, cage: bpy.types.Object) -> None:
     for rig in {cage, owner, *layers.below(owner)}:
         for skin in rig.cage_rig.skins:
             skin.applied |= skin.object == obj
-    modifier.remove(obj, None)
+    modifier.remove(obj, None, removing=False)
     stack.keep_suspended_off(obj)
     dependence.settle(obj, [])

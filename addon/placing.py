@@ -51,8 +51,13 @@ def _moved(matrix: Matrix4, points: Points) -> Points:
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def _same(one: Points, other: Points, size: float) -> bool:
-    return one.shape == other.shape and bool(np.abs(one - other).max() <= NEAR * size)
+def _same(one: Points, other: Points, size: float, fuzz: float = 0.0) -> bool:
+    return one.shape == other.shape and bool(np.abs(one - other).max() <= NEAR * size + fuzz)
+
+
+def _fuzz(space: Matrix4, world: Matrix4) -> float:
+    """How far float32 matrices may put a point off that goes from `world` into a space."""
+    return 5e-7 * float(np.abs(np.linalg.inv(space)).max() * np.abs(world).max())
 
 
 def _size(points: Points) -> float:
@@ -69,8 +74,8 @@ def _settle_cage(cage: bpy.types.Object, world: Matrix4) -> None:
     if len(seen) == len(state):
         before, old = np.reshape(seen[:16], (4, 4)), np.reshape(seen[16:], (-1, 3))
         change = np.linalg.inv(world) @ before
-        size = _size(points)
-        if _same(marks, _moved(change, old), size) and not _same(marks, old, size):
+        size, fuzz = _size(points), _fuzz(world, before)
+        if _same(marks, _moved(change, old), size, fuzz) and not _same(marks, old, size):
             to_rig = np.array(cage.cage_rig.cage_to_rig, np.float64) @ np.linalg.inv(change)
             cage.cage_rig.cage_to_rig = to_rig.T.tolist()
     mesh[SEEN] = state
@@ -87,12 +92,13 @@ def _settle_skins(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.D
     """Take over skins that were applied alone. Returns whether all that can be looked at rest where they were bound."""
     whole = True
     for skin in _skins(cage):
-        now, bound = np.linalg.inv(bones) @ _world(skin.object, depsgraph), np.array(skin.skin_to_rig, np.float64)
+        world, bound = _world(skin.object, depsgraph), np.array(skin.skin_to_rig, np.float64)
+        now, fuzz = np.linalg.inv(bones) @ world, _fuzz(bones, world)
         base, rest = (positions.read_some(mesh, SAMPLES) for mesh in (skin.object.data, skin.snapshot))
         size = _size(rest)
-        if not _same(_moved(now, base), rest, size):
+        if not _same(_moved(now, base), rest, size, fuzz):
             whole = False
-        elif np.isfinite(bound).all() and not _same(_moved(bound, base), rest, size):
+        elif np.isfinite(bound).all() and not _same(_moved(bound, base), rest, size, fuzz):
             skin.skin_to_rig = now.T.tolist()
     return whole
 
@@ -123,10 +129,12 @@ def _of_armature(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.De
         return None
     for skin in _skins(cage):
         base, old = (positions.read_base(mesh).astype(np.float64) for mesh in (skin.object.data, skin.snapshot))
-        new = _moved(np.linalg.inv(bones) @ _world(skin.object, depsgraph), base)
+        world = _world(skin.object, depsgraph)
+        new, fuzz = _moved(np.linalg.inv(bones) @ world, base), _fuzz(bones, world)
         change = np.eye(4)
         change[:3] = np.linalg.lstsq(np.c_[old, np.ones(len(old))], new, rcond=None)[0].T
-        agree = _same(_moved(change, old), new, _size(new)) and _same(_moved(change, then), now, _size(now))
+        agree = _same(_moved(change, old), new, _size(new), fuzz)
+        agree &= _same(_moved(change, then), now, _size(now), fuzz)
         if agree and np.linalg.det(change[:3, :3]) > 0.0:
             return change
     return None

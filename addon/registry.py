@@ -66,28 +66,24 @@ def is_rig(obj: bpy.types.Object) -> bool:
 
 def touched(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
     """The rigs of which a participant is among the updates of `depsgraph`. Runs on every update: must idle cheaply."""
-    if _found.count != len(bpy.data.objects):
+    updated, unknown = _updated(depsgraph)  # first: to look may remove what is among them
+    if unknown or _found.count != len(bpy.data.objects):
         _look()
-    found, known = _touched(depsgraph)
-    if not known:  # objects were replaced by as many others
-        _look()
-        found, _ = _touched(depsgraph)
-    if not found:
-        return []
-    return layers.bottom_up([cage for cage in _cages() if cage.session_uid in found])
+    found = set().union(*(_found.participants.get(uid, set()) for uid in updated))
+    return layers.bottom_up([cage for cage in _cages() if cage.session_uid in found]) if found else []
 
 
-def _touched(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], bool]:
-    """Session uids of the rest cages that are touched, and whether all rigs among the updates are known."""
-    found: set[int] = set()
+def _updated(depsgraph: bpy.types.Depsgraph) -> tuple[list[int], bool]:
+    """Session uids of what was updated, and whether a rig is among it that was not found yet: it may have taken the
+    place of another object.
+    """
+    uids, unknown = [], False
     for update in depsgraph.updates:
         changed = update.id.original
-        touched = _found.participants.get(changed.session_uid)
-        if touched:
-            found |= touched
-        elif isinstance(changed, bpy.types.Object) and is_rig(changed):
-            return found, False
-    return found, True
+        uids.append(changed.session_uid)
+        if isinstance(changed, bpy.types.Object) and uids[-1] not in _found.participants:
+            unknown |= is_rig(changed)
+    return uids, unknown
 
 
 def participants(cage: bpy.types.Object) -> list[bpy.types.ID]:
@@ -123,4 +119,4 @@ def _release_strays() -> None:
     for obj in bpy.data.objects:
         mark = obj.cage_rig
         if mark.part == "SKIN" and not (mark.owner and any(skin.object == obj for skin in mark.owner.cage_rig.skins)):
-            stack.release(obj)
+            stack.release(obj, removing=False)

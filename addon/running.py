@@ -41,6 +41,9 @@ class Running:
     refit_bones: Any = None  # the core's, once they were read
     bones: glance.Bones | None = None  # as last read
     seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
+    note: str = ""  # what the artist should know, as of the last close look
+    modes: list[str] = field(default_factory=list)  # of the skins, and what was found of them then
+    edited: str = ""
     places: skins.Places = field(default_factory=dict)
     written: dict[int, tuple[int, bytes]] = field(default_factory=dict)
 

@@ -21,6 +21,7 @@ from . import (
     placing,
     posed_edits,
     registry,
+    resting,
     showing,
     skins,
 )
@@ -169,6 +170,8 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
         running.cage_wanted, running.memory = None, b""
     if not known:
         running.seen = None
+        if event is not Event.FRAME:
+            running.note = resting.look(cage, running, event)
     note = _advance(cage, running, depsgraph, event)
     showing.write(cage, running, depsgraph)
     if running.stale:
@@ -176,10 +179,10 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     else:
         _stale.discard(registry.key_of(cage))
     if not known:
-        _resume(cage, note)
+        _resume(cage, note, running)
         running.seen = glance.seen(cage) if glance.is_plain(cage) else None
     elif cage.cage_rig.message:
-        _resume(cage, note)
+        _resume(cage, note, running)
 
 
 def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> bool:
@@ -330,7 +333,7 @@ def _pause(cage: bpy.types.Object, message: str) -> None:
             stack.show_suspended(obj, True)
 
 
-def _resume(cage: bpy.types.Object, note: str) -> None:
+def _resume(cage: bpy.types.Object, note: str, running: Running) -> None:
     settings = cage.cage_rig
     if settings.state != "LIVE":
         settings.state = "LIVE"
@@ -339,7 +342,7 @@ def _resume(cage: bpy.types.Object, note: str) -> None:
             modifier.set_shown(obj, True)
             if stack.reads_back(obj):
                 _ask_again(cage)
-    note = note or health.lost_skins(cage)
+    note = note or health.lost_skins(cage) or running.note
     if settings.message != note:
         settings.message = note
     if settings.fix:

@@ -30,13 +30,14 @@ ALLOWED: dict[str, tuple[set[str], set[str]]] = {
     "skins": ({"bpy", "numpy"}, {"adapters", "health", "session"}),
     "binding": ({"bpy", "numpy"}, {"adapters", "session"}),
     "running": ({"bpy", "numpy"}, {"glance", "session", "skins"}),
+    "resting": ({"bpy", "numpy"}, {"adapters", "health", "running"}),
     "placing": ({"bpy", "mathutils", "numpy"}, {"adapters", "binding", "layers", "skins"}),
     "posed_edits": ({"bpy", "numpy"}, {"adapters", "linked", "registry", "running", "session"}),
     "showing": ({"bpy", "numpy"}, {"adapters", "binding", "health", "running", "skins"}),
     "sync": (
         {"bpy", "numpy"},
         {"adapters", "applied", "binding", "choosing", "glance", "health", "layers", "linked", "migration"}
-        | {"placing", "posed_edits", "registry", "running", "session", "showing", "skins"},
+        | {"placing", "posed_edits", "registry", "resting", "running", "session", "showing", "skins"},
     ),
     "generator": ({"cage_rig_core", "hashlib", "numpy"}, set()),
     "reading": ({"bpy", "numpy"}, {"adapters", "health", "session"}),

@@ -111,8 +111,7 @@ def write(skin: bpy.types.Object, points: Points) -> None:
     if _is_linked(mesh) or _is_shared(mesh):
         positions.write_base(_own_feed(skin).data, points)
         return
-    if read(_leader(skin), "Use Feed"):  # it was shared
-        _drop_feed(skin)
+    set_inputs(_leader(skin), {"Use Feed": False, "Feed": None})  # it was shared
     attribute = mesh.attributes.get(ATTRIBUTE)
     if attribute is None:
         attribute = mesh.attributes.new(ATTRIBUTE, "FLOAT_VECTOR", "POINT")
@@ -163,17 +162,6 @@ def _feed(skin: bpy.types.Object) -> bpy.types.Object | None:
     return feed if feed.cage_rig.owner in (None, skin) else None  # a duplicate has it from the first one
 
 
-def _drop_feed(skin: bpy.types.Object) -> None:
-    feed = read(_leader(skin), "Feed")
-    set_inputs(_leader(skin), {"Use Feed": False, "Feed": None})
-    _remove_feed(feed)
-
-
-def _remove_feed(feed: bpy.types.Object | None) -> None:
-    if feed is not None and feed.users == 0 and feed.library is None:
-        bpy.data.meshes.remove(feed.data)
-
-
 def _own_feed(skin: bpy.types.Object) -> bpy.types.Object:
     feed = _feed(skin)
     if feed is None:
@@ -186,16 +174,20 @@ def _own_feed(skin: bpy.types.Object) -> bpy.types.Object:
     return feed
 
 
-def remove(skin: bpy.types.Object, cage: bpy.types.Object | None) -> None:
-    """Take the modifier of a rig off the skin (None: all of ours), and what nothing uses any more."""
+def remove(skin: bpy.types.Object, cage: bpy.types.Object | None, *, removing: bool = True) -> None:
+    """Take the modifier of a rig off the skin (None: all of ours), and what nothing uses any more.
+
+    Without `removing` that stays until the file is saved: handlers must not remove what an update may still name.
+    """
     for modifier in ours(skin):
         if cage is None or cage_of(modifier) in (cage, None):
             group, feed = modifier.node_group, read(modifier, "Feed")
             set_inputs(modifier, {"Feed": None})  # or Blender 5.2 goes on counting the modifier among its users
             skin.modifiers.remove(modifier)
-            if group.users == 0 and group.library is None:
+            if removing and group.users == 0 and group.library is None:
                 bpy.data.node_groups.remove(group)
-            _remove_feed(feed)
+            if removing and feed is not None and feed.users == 0 and feed.library is None:
+                bpy.data.meshes.remove(feed.data)
     if not ours(skin) and skin.data is not None and not _is_linked(skin.data):
         # the feed, and where a modifier was applied what it kept
         for name in [found.name for found in skin.data.attributes if found.name.startswith(OURS)]:

@@ -102,6 +102,11 @@ def suspended_names(obj: bpy.types.Object) -> set[str]:
     return {modifier.name for modifier, _ in _suspended(obj)}
 
 
+def shown_suspended(obj: bpy.types.Object) -> list[str]:
+    """The present names of suspended modifiers that somebody shows."""
+    return [modifier.name for modifier, _ in _suspended(obj) if modifier.show_viewport or modifier.show_render]
+
+
 def restore_suspended(obj: bpy.types.Object) -> None:
     """Put suspended modifiers back as they were, and forget them."""
     show_suspended(obj, True)
@@ -168,9 +173,12 @@ def reordering(skin: bpy.types.Object) -> str | None:
     return next((m.name for m in after if (m.show_viewport or m.show_render) and m.type not in known), None)
 
 
-def release(skin: bpy.types.Object) -> None:
-    """Give a skin back as it was before all binds: our modifiers and feed off, its Armature modifier on again."""
-    remove(skin, None)
+def release(skin: bpy.types.Object, *, removing: bool = True) -> None:
+    """Give a skin back as it was before all binds: our modifiers and feed off, its Armature modifier on again.
+
+    `removing` as in `modifier.remove`.
+    """
+    remove(skin, None, removing=removing)
     restore_suspended(skin)
     dependence.settle(skin, [])
     skin.property_unset("cage_rig")

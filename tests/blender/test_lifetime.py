@@ -13,6 +13,7 @@ from scene import (
     bind,
     bound_bar,
     build_bar,
+    drag,
     enter_edit_mode,
     fat_key,
     leave_edit_mode,
@@ -155,6 +156,17 @@ def test_deleted_cage_gives_the_skins_back(bar: Rig, how: str) -> None:
     assert ours is None or not ours.show_viewport
 
 
+def test_what_a_handler_gives_back_is_removed_when_the_file_is_saved(bar: Rig, tmp_path: Path) -> None:
+    """Not before: Blender's list of what was updated may still name it, for the handlers that come after."""
+    bpy.data.objects.remove(bar.cage)
+    update()
+    assert bar.skin.cage_rig.part == "NONE" and [group.users for group in bpy.data.node_groups] == [0]
+    path = str(tmp_path / "plain.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert not bpy.data.node_groups
+
+
 def test_deleted_posed_cage_comes_back_with_rebind(bar: Rig) -> None:
     delete(bar.posed, "script")
     select([bar.cage], bar.cage)
@@ -210,6 +222,55 @@ def edit_bones(rig: Rig, change: object) -> None:
     change(rig.armature.data.edit_bones)
     bpy.ops.object.mode_set(mode="OBJECT")
     update()
+
+
+def test_bones_that_exchange_their_names_are_followed(bar: Rig) -> None:
+    one, other = (bone.name for bone in bar.armature.data.bones)
+    bones = bar.armature.data.bones
+    bones[one].name, bones[other].name = "between", one
+    bones["between"].name = other
+    update()
+    bend(bar, 0.6, one)
+    bend(bar, -0.3, other)
+    assert bar.settings.state == "LIVE" and bar.settings.message == ""
+    assert np.abs(shown(bar.skin) - native(bar.skin)).max() < 1e-6
+
+
+def test_moved_rest_bones_are_told(bar: Rig) -> None:
+    bend(bar, 0.6)
+    enter_edit_mode(bar.armature)
+    bar.armature.data.edit_bones["upper"].head.x += 0.1
+    leave_edit_mode()
+    assert bar.settings.state == "LIVE"
+    assert "' of 'BarRig' rests otherwise than when it was bound" in bar.settings.message
+    bpy.context.scene.frame_set(3)
+    assert "rests otherwise" in bar.settings.message
+    select([bar.cage], bar.cage)
+    assert bpy.ops.cage_rig.rebind() == {"FINISHED"}
+    assert bar.settings.message == "" and np.abs(shown(bar.skin) - native(bar.skin)).max() < 1e-6
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+def test_moved_vertices_of_a_skin_are_told(bar: Rig, mode: str) -> None:
+    bend(bar, 0.6)
+    bpy.ops.ed.undo_push(message="Bend")
+    select([bar.skin], bar.skin)
+    bpy.ops.object.mode_set(mode=mode)
+    if mode == "EDIT":
+        drag(bar.skin, 7, (0.0, 0.0, 0.1))
+    else:
+        points = rest(bar.skin)
+        points[7, 2] += 0.1
+        set_mesh(bar.skin, points)
+    leave_edit_mode()
+    assert bar.settings.state == "LIVE"
+    assert bar.settings.message.startswith("The vertices of 'Bar' were moved since it was bound; press Rebind")
+    bend(bar, 0.5)
+    assert bar.settings.message != ""
+    bpy.ops.ed.undo_push(message="Edit")
+    select([bar.cage], bar.cage)
+    assert bpy.ops.cage_rig.rebind() == {"FINISHED"}
+    assert bar.settings.message == "" and np.abs(shown(bar.skin) - native(bar.skin)).max() < 1e-6
 
 
 def test_deleted_bone_pauses_by_name(bar: Rig) -> None:

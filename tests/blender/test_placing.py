@@ -177,6 +177,20 @@ def test_a_cage_that_is_moved_stays_what_it_was() -> None:
     assert np.abs(in_world(rig.skin) - before["skin"]).max() > 0.01, "an edit is an edit"
 
 
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_a_character_that_was_moved_far_and_scaled(scale: float) -> None:
+    rig = placed()
+    edit(rig)
+    bend(rig, 0.6)
+    for obj in (rig.armature, rig.cage):
+        obj.matrix_world = Matrix.LocRotScale((5.0, -7.0, 30.0), None, (scale,) * 3) @ obj.matrix_world
+    update()
+    before, size = in_world(rig.skin), scale * 3.6
+    apply([rig.skin, rig.armature, rig.cage, rig.posed, rig.refit])
+    assert rig.settings.state == "LIVE" and rig.settings.message == "", rig.settings.message
+    assert np.abs(in_world(rig.skin) - before).max() < 2e-3 * size
+
+
 def test_bones_that_are_scaled_in_edit_mode_are_another_rest_pose() -> None:
     rig = placed()
     before = list(rig.settings.joints[0].tail)

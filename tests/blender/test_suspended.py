@@ -45,6 +45,17 @@ def test_one_that_was_renamed_moves_the_skin_while_somebody_shows_it(bar: Rig) -
     assert np.abs(posed_by(suspended(bar)) - plain).max() < 1e-6
 
 
+@pytest.mark.parametrize("where", ["show_viewport", "show_render"])
+def test_one_that_is_shown_beside_ours_is_told(bar: Rig, where: str) -> None:
+    bend(bar, 1.0)
+    setattr(suspended(bar), where, True)
+    update()
+    assert bar.settings.message == "Modifier 'Armature' of 'Bar' deforms it a second time; hide it, or press Unbind"
+    setattr(suspended(bar), where, False)
+    update()
+    assert bar.settings.state == "LIVE" and bar.settings.message == ""
+
+
 def test_one_that_was_renamed_is_remembered_by_rebind(bar: Rig) -> None:
     suspended(bar).name = "Bones"
     select([bar.cage], bar.cage)
