@@ -10,7 +10,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import layers
+from . import binding, layers
 from .adapters import dependence, modifier, positions, stack
 
 NEAR = 1e-5  # of the skin's size: a skin no farther from its bound shape was not moved
@@ -19,11 +19,13 @@ NEAR = 1e-5  # of the skin's size: a skin no farther from its bound shape was no
 def settle(cage: bpy.types.Object) -> None:
     """Let skins that were applied leave this rig, and all others that they were on."""
     for skin in cage.cage_rig.skins:
-        if skin.object is not None and not skin.applied and skin.snapshot is not None and _was_applied(skin):
+        if skin.applied and skin.object is not None and modifier.find(skin.object, cage) is not None:
+            skin.applied = False  # an undo brings back the modifier, and not what a handler wrote since
+        if skin.object is not None and not skin.applied and skin.snapshot is not None and _was_applied(skin, cage):
             _leave(skin.object, cage)
 
 
-def _was_applied(skin: bpy.types.PropertyGroup) -> bool:
+def _was_applied(skin: bpy.types.PropertyGroup, cage: bpy.types.Object) -> bool:
     obj = skin.object
     owner = obj.cage_rig.owner
     if obj.type != "MESH" or obj.data.is_editmode or not layers.is_own(obj) or owner is None:
@@ -36,7 +38,7 @@ def _was_applied(skin: bpy.types.PropertyGroup) -> bool:
     at_feed = fed is not None and np.array_equal(points, fed)
     if not at_feed and len(obj.modifiers):
         return False
-    rest = positions.read_base(skin.snapshot)
+    rest = binding.rest_points(cage.cage_rig, skin.snapshot)
     near = NEAR * float(np.linalg.norm(np.ptp(rest, axis=0)))
     return not positions.close(positions.apply_matrix(np.array(skin.skin_to_rig, np.float64), points), rest, near)
 

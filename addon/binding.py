@@ -35,6 +35,17 @@ def bound_anew(cage: bpy.types.Object) -> Session:
         raise Damaged(error) from error
 
 
+def key(settings: bpy.types.PropertyGroup) -> str:
+    """Other for every bind, and for every rig space that it is brought to."""
+    return settings.bind_id + np.array(settings.rebased, np.float32).tobytes().hex()
+
+
+def rest_points(settings: bpy.types.PropertyGroup, mesh: bpy.types.Mesh) -> positions.Points:
+    """The points of a snapshot of the rig in today's rig space, `#V by 3`."""
+    points, change = positions.read_base(mesh), np.array(settings.rebased, np.float64)
+    return positions.apply_matrix(change, points) if change.any() else points
+
+
 def mark(cage: bpy.types.Object) -> None:
     """Let the snapshots name the bind that they are of."""
     for owner in (cage.cage_rig, *cage.cage_rig.skins):
@@ -54,7 +65,7 @@ def read(cage: bpy.types.Object) -> Snapshot:
             raise attributes.Damaged(f"the place of '{name}' is lost")
     parts = [
         SkinSnapshot(
-            positions.read_base(skin.snapshot),
+            rest_points(settings, skin.snapshot),
             positions.read_faces(skin.snapshot),
             snapshot.read_weights(skin.snapshot),
         )
@@ -66,7 +77,7 @@ def read(cage: bpy.types.Object) -> Snapshot:
         np.array([joint.head for joint in joints], np.float64).reshape(-1, 3),
         np.array([joint.tail for joint in joints], np.float64).reshape(-1, 3),
         np.array([joint.parent for joint in joints], np.int32),
-        positions.read_base(settings.snapshot),
+        rest_points(settings, settings.snapshot),
         positions.read_faces(settings.snapshot),
         settings.method.lower(),
         _read_known(settings),

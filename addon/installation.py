@@ -33,6 +33,8 @@ def install(context: bpy.types.Context, cage: bpy.types.Object, bound: Bound, se
     sync.drop(cage)
     _write_joints(cage, bound)
     settings.bind_id = uuid.uuid4().hex
+    settings.property_unset("rebased")
+    settings.property_unset("place")
     settings.cage_to_rig = bound.cage_to_rig.T.tolist()
     remove_mesh(settings.snapshot)
     settings.snapshot = snapshot.write(f"{cage.name} Bind", bound.snapshot.cage, bound.snapshot.cage_faces, None)

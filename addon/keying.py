@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from . import linked, registry, sync
+from . import binding, linked, registry, sync
 from .adapters import cage_keys, positions
 
 
@@ -44,7 +44,7 @@ def key_envelope(context: bpy.types.Context, cage: bpy.types.Object) -> float:
     """Key the cage as it was bound at the present frame, which is returned; an unkeyed edit is thrown away."""
     frame = context.scene.frame_current_final
     to_rig = np.array(cage.cage_rig.cage_to_rig, np.float64)
-    points = positions.apply_matrix(np.linalg.inv(to_rig), positions.read_base(cage.cage_rig.snapshot))
+    points = positions.apply_matrix(np.linalg.inv(to_rig), binding.rest_points(cage.cage_rig, cage.cage_rig.snapshot))
     with _editable(context, cage):
         block = cage_keys.insert_envelope(cage, frame, points)
         cage_keys.remove_draft(cage)

@@ -7,8 +7,6 @@ It is seen in the file alone, whatever was done meanwhile: an undo may come back
 
 from __future__ import annotations
 
-import uuid
-
 import bpy
 import numpy as np
 from mathutils import Matrix
@@ -18,7 +16,6 @@ from . import binding, layers
 from .adapters import armature, positions
 from .skins import is_flat
 
-SEEN = "cage_rig_place"  # on the posed cage's mesh: where the rest cage was last, and four points of it
 NEAR = 1e-5  # of the size
 SAMPLES = 8  # vertices of a skin that are looked at first
 Matrix4 = NDArray[np.float64]
@@ -65,20 +62,19 @@ def _size(points: Points) -> float:
 
 
 def _settle_cage(cage: bpy.types.Object, world: Matrix4) -> None:
-    mesh, points = cage.cage_rig.posed_cage.data, positions.read_base(cage.data).astype(np.float64)
+    settings, points = cage.cage_rig, positions.read_base(cage.data).astype(np.float64)
     marks = _marks(points)
-    state = [*world.ravel().tolist(), *marks.ravel().tolist()]
-    seen = list(mesh.get(SEEN, ()))
-    if seen == state:
+    state, seen = np.float32([*world.ravel(), *marks.ravel()]), np.float32(settings.place)
+    if np.array_equal(seen, state):
         return
-    if len(seen) == len(state):
-        before, old = np.reshape(seen[:16], (4, 4)), np.reshape(seen[16:], (-1, 3))
+    if seen.any():
+        before, old = seen[:16].astype(np.float64).reshape(4, 4), seen[16:].astype(np.float64).reshape(-1, 3)
         change = np.linalg.inv(world) @ before
         size, fuzz = _size(points), _fuzz(world, before)
         if _same(marks, _moved(change, old), size, fuzz) and not _same(marks, old, size):
-            to_rig = np.array(cage.cage_rig.cage_to_rig, np.float64) @ np.linalg.inv(change)
-            cage.cage_rig.cage_to_rig = to_rig.T.tolist()
-    mesh[SEEN] = state
+            to_rig = np.array(settings.cage_to_rig, np.float64) @ np.linalg.inv(change)
+            settings.cage_to_rig = to_rig.T.tolist()
+    settings.place = state.tolist()
 
 
 def _marks(points: Points) -> Points:
@@ -95,6 +91,7 @@ def _settle_skins(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.D
         world, bound = _world(skin.object, depsgraph), np.array(skin.skin_to_rig, np.float64)
         now, fuzz = np.linalg.inv(bones) @ world, _fuzz(bones, world)
         base, rest = (positions.read_some(mesh, SAMPLES) for mesh in (skin.object.data, skin.snapshot))
+        rest = _moved(_rebased(cage), rest)
         size = _size(rest)
         if not _same(_moved(now, base), rest, size, fuzz):
             whole = False
@@ -128,7 +125,8 @@ def _of_armature(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.De
     if _same(now, then, _size(then)):
         return None
     for skin in _skins(cage):
-        base, old = (positions.read_base(mesh).astype(np.float64) for mesh in (skin.object.data, skin.snapshot))
+        base = positions.read_base(skin.object.data).astype(np.float64)
+        old = binding.rest_points(cage.cage_rig, skin.snapshot).astype(np.float64)
         world = _world(skin.object, depsgraph)
         new, fuzz = _moved(np.linalg.inv(bones) @ world, base), _fuzz(bones, world)
         change = np.eye(4)
@@ -140,25 +138,34 @@ def _of_armature(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.De
     return None
 
 
+def _rebased(cage: bpy.types.Object) -> Matrix4:
+    found = np.array(cage.cage_rig.rebased, np.float64)
+    return found if found.any() else np.eye(4)
+
+
 def _rebase(cage: bpy.types.Object, change: Matrix4, depsgraph: bpy.types.Depsgraph) -> None:
-    """Bring all that the rig keeps in rig space to the armature's present space."""
+    """Bring all that the rig keeps in rig space to the armature's present space.
+
+    In the settings alone: an undo brings back what its step has changed, and leaves what a handler wrote elsewhere.
+    """
     settings = cage.cage_rig
-    for owner in (settings, *settings.skins):
-        if owner.snapshot is not None:
-            if owner.snapshot.users > 1:  # a duplicate of the character has it too
-                owner.snapshot = owner.snapshot.copy()
-            positions.write_base(owner.snapshot, positions.apply_matrix(change, positions.read_base(owner.snapshot)))
+    settings.rebased = (change @ _rebased(cage)).T.tolist()
     for skin in settings.skins:
         skin.skin_to_rig = (change @ np.array(skin.skin_to_rig, np.float64)).T.tolist()
     settings.cage_to_rig = (change @ np.array(settings.cage_to_rig, np.float64)).T.tolist()
     for joint in settings.joints:
         joint.head, joint.tail = _moved(change, np.array([joint.head, joint.tail], np.float64))
         joint.shift = change[:3, :3] @ np.array(joint.shift, np.float64)
-    settings.bind_id = uuid.uuid4().hex
-    binding.mark(cage)
     for obj in (settings.posed_cage, settings.refit_armature):
         if obj is not None and obj.parent == settings.armature:
-            _put_back(obj, _from_bones(obj, depsgraph))
+            obj.matrix_parent_inverse.identity()
+            obj.matrix_basis.identity()
+    refit = settings.refit_armature
+    if refit is not None and len(refit.data.bones) == len(settings.joints):
+        heads = armature.read_rest(refit.data).heads
+        wanted = np.array([joint.head for joint in settings.joints], np.float64)
+        if _same(_moved(change, heads), wanted, _size(wanted), _fuzz(np.eye(4), change)):
+            refit.data.transform(Matrix(change))
 
 
 def posed_has_stayed(

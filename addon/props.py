@@ -145,6 +145,16 @@ class CageRigSettings(bpy.types.PropertyGroup):
     joints: CollectionProperty(type=CageRigJoint, name="Joints", override=OVERRIDABLE | {"USE_INSERTION"})
     snapshot: PointerProperty(type=bpy.types.Mesh, name="Cage at Bind", override=OVERRIDABLE)
     bind_id: StringProperty(name="Bind", description="Which bind the snapshots are of", override=OVERRIDABLE)
+    rebased: FloatVectorProperty(
+        name="Rebased",
+        description="From rig space at the bind, which the snapshots are in, to that of today; zeros: the same",
+        subtype="MATRIX",
+        size=(4, 4),
+        override=OVERRIDABLE,
+    )
+    place: FloatVectorProperty(
+        name="Place", description="Where the cage object was last, and four points of its mesh", size=28
+    )
     coordinates: StringProperty(
         name="Coordinates",
         description="Where the rig's coordinates were loaded from; empty: they are computed from the bind",

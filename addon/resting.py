@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import health
+from . import binding, health
 from .adapters import armature, modifier, positions, stack
 from .running import Event, Running
 
@@ -38,7 +38,7 @@ def _edited(cage: bpy.types.Object) -> str:
         same_count = skin.snapshot is not None and len(obj.data.vertices) == len(skin.snapshot.vertices) > 0
         if not same_count or obj.data.is_editmode or stack.deformed_before(obj):
             continue  # what modifiers before ours are given is taken over at once
-        rest = positions.read_base(skin.snapshot)
+        rest = binding.rest_points(cage.cage_rig, skin.snapshot)
         base = positions.apply_matrix(np.array(skin.skin_to_rig, np.float64), positions.read_base(obj.data))
         if not positions.close(base, rest, NEAR * float(np.linalg.norm(np.ptp(rest, axis=0)))):
             return f"The vertices of '{obj.name}' were moved since it was bound; press Rebind to take that over"

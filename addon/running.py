@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import glance, skins
+from . import binding, glance, skins
 from .session import Session
 
 Points = NDArray[np.float32]
@@ -31,7 +31,7 @@ class Running:
     """One rig, from its bind or load until its session is dropped."""
 
     session: Session
-    bind_id: str  # of the snapshot that the session was made from
+    bind: str  # that the session was made from, see binding.key
     cage_to_rig: Matrix | None  # None: the identity
     cage: Points | None = None  # rest cage, rig space, as last read
     cage_wanted: Points | None = None  # rest cage that we wrote and have not read yet
@@ -50,7 +50,7 @@ class Running:
     @classmethod
     def of(cls, cage: bpy.types.Object, session: Session) -> Running:
         """The rig of this rest cage, bound in `session`."""
-        found = cls(session, cage.cage_rig.bind_id, None)
+        found = cls(session, binding.key(cage.cage_rig), None)
         found.place(cage)
         return found
 
