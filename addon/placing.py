@@ -7,6 +7,8 @@ It is seen in the file alone, whatever was done meanwhile: an undo may come back
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import bpy
 import numpy as np
 from mathutils import Matrix
@@ -22,22 +24,29 @@ Matrix4 = NDArray[np.float64]
 Points = NDArray[np.float64]
 
 
-def settle(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """Take over what Apply or Set Origin did. Where points were moved as well, nothing is taken over."""
+def settle(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, seen: bytes = b"") -> bytes:
+    """Take over what Apply or Set Origin did. Where points were moved as well, nothing is taken over.
+
+    Skins are looked at where an object has moved since the places that the last call returned were `seen`.
+    """
     settings = cage.cage_rig
     objects = (cage, settings.armature, settings.posed_cage)
     if any(obj is None or obj.data is None or not layers.is_own(obj) or obj.mode == "EDIT" for obj in objects):
-        return
+        return b""
     worlds = [_world(obj, depsgraph) for obj in objects]
     kinds = [obj.type for obj in objects]
     if settings.snapshot is None or kinds != ["MESH", "ARMATURE", "MESH"] or any(map(is_flat, worlds)):
-        return
+        return b""
     _settle_cage(cage, worlds[0])
+    found = b"".join(world.tobytes() for world in (*worlds, *(_world(skin.object, depsgraph) for skin in _skins(cage))))
+    if found == seen:
+        return found
     if not _settle_skins(cage, worlds[1], depsgraph):
         change = _of_armature(cage, worlds[1], depsgraph)
         if change is not None:
-            _rebase(cage, change, depsgraph)
+            _rebase(cage, change)
             _settle_skins(cage, worlds[1], depsgraph)
+    return found
 
 
 def _world(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix4:
@@ -79,9 +88,13 @@ def _settle_cage(cage: bpy.types.Object, world: Matrix4) -> None:
 
 def _marks(points: Points) -> Points:
     """Four points that go with any affine map of all points, and with hardly anything else."""
-    waves = np.cos(np.outer(np.arange(1.0, 5.0), np.arange(len(points))))
-    weights = 1.0 + 0.9 * waves
-    return (weights / weights.sum(1, keepdims=True)) @ points
+    return _weights(len(points)) @ points
+
+
+@lru_cache(maxsize=8)
+def _weights(count: int) -> Matrix4:
+    weights = 1.0 + 0.9 * np.cos(np.outer(np.arange(1.0, 5.0), np.arange(count)))
+    return weights / weights.sum(1, keepdims=True)
 
 
 def _settle_skins(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -143,7 +156,7 @@ def _rebased(cage: bpy.types.Object) -> Matrix4:
     return found if found.any() else np.eye(4)
 
 
-def _rebase(cage: bpy.types.Object, change: Matrix4, depsgraph: bpy.types.Depsgraph) -> None:
+def _rebase(cage: bpy.types.Object, change: Matrix4) -> None:
     """Bring all that the rig keeps in rig space to the armature's present space.
 
     In the settings alone: an undo brings back what its step has changed, and leaves what a handler wrote elsewhere.

@@ -16,12 +16,16 @@ from .running import Event, Running
 NEAR = 1e-4  # of the size, and of a direction
 
 
-def look(cage: bpy.types.Object, running: Running, event: Event) -> str:
-    """What the artist should know, or an empty string. Skins are looked at when their mode has changed."""
+def look(cage: bpy.types.Object, running: Running, event: Event, *, bones: bool) -> str:
+    """What the artist should know, or an empty string. Skins are looked at when their mode has changed, `bones` when an
+    armature has.
+    """
+    if bones or event is Event.RESTORED:
+        running.bones_note = _bones(cage)
     modes = [obj.mode for _, obj in health.live_skins(cage)]
     if modes != running.modes or event is Event.RESTORED:
         running.modes, running.edited = modes, _edited(cage)
-    return _twice(cage) or _bones(cage) or running.edited
+    return _twice(cage) or running.bones_note or running.edited
 
 
 def _twice(cage: bpy.types.Object) -> str:

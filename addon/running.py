@@ -42,6 +42,8 @@ class Running:
     bones: glance.Bones | None = None  # as last read
     seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
     note: str = ""  # what the artist should know, as of the last close look
+    worlds: bytes = b""  # where its objects were, see placing
+    bones_note: str = ""
     modes: list[str] = field(default_factory=list)  # of the skins, and what was found of them then
     edited: str = ""
     places: skins.Places = field(default_factory=dict)

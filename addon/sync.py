@@ -171,7 +171,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     if not known:
         running.seen = None
         if event is not Event.FRAME:
-            running.note = resting.look(cage, running, event)
+            running.note = resting.look(cage, running, event, bones=depsgraph.id_type_updated("ARMATURE"))
     note = _advance(cage, running, depsgraph, event)
     showing.write(cage, running, depsgraph)
     if running.stale:
@@ -202,7 +202,10 @@ def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event:
     linked.own_posed_mesh(cage)
     applied.settle(cage)
     if event is not Event.FRAME and depsgraph.mode == "VIEWPORT":
-        placing.settle(cage, depsgraph)
+        running = None if event is Event.RESTORED else _running.get(cage.session_uid)
+        worlds = placing.settle(cage, depsgraph, running.worlds if running else b"")
+        if running is not None:
+            running.worlds = worlds
     for obj in layers.skins_of(cage):
         layers.settle(obj)
     trouble = health.problem(cage)
