@@ -29,6 +29,8 @@ def look(cage: bpy.types.Object, running: Running, event: Event, *, bones: bool)
 
 
 def _twice(cage: bpy.types.Object) -> str:
+    if cage.cage_rig.state != "LIVE":
+        return ""  # the modifiers of a rig that was paused are not as it has them
     for _, obj in health.live_skins(cage):
         shown = stack.shown_suspended(obj)
         if shown and modifier.is_shown(obj):
