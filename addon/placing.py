@@ -7,6 +7,7 @@ It is seen in the file alone, whatever was done meanwhile: an undo may come back
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import bpy
@@ -46,6 +47,8 @@ def settle(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, seen: bytes =
         if change is not None:
             _rebase(cage, change)
             _settle_skins(cage, worlds[1], depsgraph)
+        for skin in _skins(cage):
+            _settle_moved(cage, skin)
     return found
 
 
@@ -113,6 +116,27 @@ def _settle_skins(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.D
     return whole
 
 
+def _settle_moved(cage: bpy.types.Object, skin: bpy.types.PropertyGroup) -> None:
+    """Take over a skin that was moved since it was bound, then applied: its base is an affine map of the old one."""
+    bound = np.array(skin.skin_to_rig, np.float64)
+    base, rest = (positions.read_some(mesh, SAMPLES) for mesh in (skin.object.data, skin.snapshot))
+    if not np.isfinite(bound).all() or _same(_moved(bound, base), _moved(_rebased(cage), rest), _size(rest)):
+        return
+    base = positions.read_base(skin.object.data).astype(np.float64)
+    rest = binding.rest_points(cage.cage_rig, skin.snapshot).astype(np.float64)
+    to_rig, exact = _affine(base, rest)
+    if exact:
+        skin.skin_to_rig = to_rig.T.tolist()
+
+
+def _affine(points: Points, images: Points, fuzz: float = 0.0) -> tuple[Matrix4, bool]:
+    """The affine map that comes nearest to taking points to their images, and whether it does."""
+    solved, _, rank, _ = np.linalg.lstsq(np.c_[points, np.ones(len(points))], images, rcond=None)
+    change = np.eye(4)
+    change[:3] = solved.T
+    return change, rank == 4 and _same(_moved(change, points), images, _size(images), fuzz)
+
+
 def _skins(cage: bpy.types.Object) -> list[bpy.types.PropertyGroup]:
     def may_be(skin: bpy.types.PropertyGroup) -> bool:
         obj, snapshot = skin.object, skin.snapshot
@@ -137,18 +161,27 @@ def _of_armature(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.De
     then = np.concatenate([heads, heads + ways])
     if _same(now, then, _size(then)):
         return None
+    for change in _candidates(cage, bones, depsgraph):
+        fuzz = _fuzz(np.eye(4), change)
+        if np.linalg.det(change[:3, :3]) > 0.0 and _same(_moved(change, then), now, _size(now), fuzz):
+            return change
+    return None
+
+
+def _candidates(cage: bpy.types.Object, bones: Matrix4, depsgraph: bpy.types.Depsgraph) -> Iterator[Matrix4]:
+    """Maps from rig space as it was bound to today's: where Blender has put the posed cage so that it stays in its
+    place, and how skins rest now, if they lie otherwise.
+    """
+    posed = cage.cage_rig.posed_cage
+    if posed.parent == cage.cage_rig.armature:
+        yield _from_bones(posed, depsgraph)
     for skin in _skins(cage):
         base = positions.read_base(skin.object.data).astype(np.float64)
         old = binding.rest_points(cage.cage_rig, skin.snapshot).astype(np.float64)
         world = _world(skin.object, depsgraph)
-        new, fuzz = _moved(np.linalg.inv(bones) @ world, base), _fuzz(bones, world)
-        change = np.eye(4)
-        change[:3] = np.linalg.lstsq(np.c_[old, np.ones(len(old))], new, rcond=None)[0].T
-        agree = _same(_moved(change, old), new, _size(new), fuzz)
-        agree &= _same(_moved(change, then), now, _size(now), fuzz)
-        if agree and np.linalg.det(change[:3, :3]) > 0.0:
-            return change
-    return None
+        change, exact = _affine(old, _moved(np.linalg.inv(bones) @ world, base), _fuzz(bones, world))
+        if exact:
+            yield change
 
 
 def _rebased(cage: bpy.types.Object) -> Matrix4:

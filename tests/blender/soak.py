@@ -16,7 +16,20 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from scene import Rig, bind, drag, enter_edit_mode, fresh, leave_edit_mode, rest, select, set_mesh, shown, update
+from scene import (
+    Points,
+    Rig,
+    bind,
+    drag,
+    enter_edit_mode,
+    fresh,
+    leave_edit_mode,
+    rest,
+    select,
+    set_mesh,
+    shown,
+    update,
+)
 
 from blend_fixtures.build import build_character
 from blend_fixtures.rigs import build_rig
@@ -34,6 +47,7 @@ class Soak:
         self.chance = random.Random(seed)
         self.path = folder / "soak.blend"
         self.met: dict[str, int] = {}
+        self.faults: list[str] = []  # found by events themselves
         self.memory: list[int] = []  # bytes of the process after every tenth of the events
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         bpy.context.preferences.edit.undo_steps = 12
@@ -75,6 +89,7 @@ class Soak:
                 self.memory.append(resident())
                 minutes = (time.monotonic() - begun) / 60.0
                 tell(f"{count} events, {len(faults)} faults, {self.memory[-1] / 1e6:.0f} MB, {minutes:.1f} min")
+        faults += self.faults
         grown = self.memory[-1] - self.memory[len(self.memory) * 2 // 5 - 1]
         if grown > GROWTH:
             faults.append(f"the process grew by {grown / 1e6:.0f} MB")
@@ -200,6 +215,33 @@ def _copy_and_delete(soak: Soak, rig: Rig) -> None:
     soak.push()
 
 
+def _apply_transform(soak: Soak, rig: Rig) -> None:
+    """Turn and scale an object and apply that (Ctrl A): the latter moves nothing. A scale of bones would: keyed places
+    do not grow with them.
+    """
+    obj = soak.chance.choice([rig.cage, rig.armature, *rig.skins])
+    obj.rotation_euler.z += soak.chance.uniform(-0.5, 0.5)
+    if obj != rig.armature:
+        obj.scale = obj.scale * soak.chance.choice((0.8, 1.25))
+    update()
+    soak.push()
+    before = [in_world(skin) for skin in rig.skins]
+    select([obj], obj)
+    bpy.ops.object.transform_apply()
+    soak.push()
+    update()
+    for skin, wanted in zip(rig.skins, before, strict=True):
+        moved = float(np.abs(in_world(skin) - wanted).max()) / rig.size
+        if not moved <= 0.02:  # vertices that lie in faces of the cage may be inside or outside after rounding
+            soak.faults.append(f"{skin.name} moved by {moved:.1e} when the transform of {obj.name} was applied")
+
+
+def in_world(obj: bpy.types.Object) -> Points:
+    """Where a skin is shown."""
+    matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    return shown(obj) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
 def _envelope(soak: Soak, rig: Rig) -> None:
     """Back to the cage as it was bound, so that shapes do not wander off over thousands of events."""
     select([rig.cage], rig.cage)
@@ -222,6 +264,7 @@ EVENTS: dict[str, Callable[[Soak, Rig], None]] = {
     "rebind": _rebind,
     "copy and delete": _copy_and_delete,
     "envelope": _envelope,
+    "apply transform": _apply_transform,
 }
 
 

@@ -162,6 +162,20 @@ def edit_keys(rig: Rig) -> None:
     update()
 
 
+@pytest.mark.parametrize("what", ["skin", "armature", "bound"])
+def test_a_skin_that_was_moved_stays_where_it_is(what: str) -> None:
+    rig = placed()
+    edit(rig)
+    bend(rig, 0.6)
+    rig.skin.rotation_euler.z += 0.3
+    rig.skin.scale *= 1.2
+    update()
+    before = look(rig)
+    apply(every(rig)[what])
+    check(rig, before)
+    assert np.abs(fresh(rig)[0] - shown(rig.skin)).max() < 1e-6
+
+
 def test_a_cage_that_is_moved_stays_what_it_was() -> None:
     """Its transform is taken once, at the bind."""
     rig = placed()
