@@ -19,6 +19,8 @@ const APART: f64 = 1.2;
 /// where less counted, they would get other cages. A limb without any node takes slighter bends.
 const BEND: f64 = 0.51;
 const SLIGHT: f64 = 0.35;
+/// On a stretch longer than so many radii slighter ones count, as they leave more between cage and skin.
+const LONG: f64 = 10.0;
 
 /// How bending nodes are placed where the user gives none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -217,7 +219,7 @@ fn placed(skin: &Skin, skeleton: &CurveSkeleton, at: usize, placement: Placement
     places
 }
 
-/// Where the course of position and radius leaves the chord from `a` to `b` by so many radii.
+/// Where the course of position and radius leaves the chord from `a` to `b` by so many radii; by less on a long way.
 fn bends(arc: &Arc, (a, b): (f64, f64), bend: f64, depth: usize, found: &mut Vec<f64>) {
     let value = |s: f64| {
         let p = arc.at(s);
@@ -230,7 +232,9 @@ fn bends(arc: &Arc, (a, b): (f64, f64), bend: f64, depth: usize, found: &mut Vec
     };
     let samples = (1..32).map(|k| a + (b - a) * f64::from(k) / 32.0);
     let Some(worst) = samples.max_by(|s, t| miss(*s).total_cmp(&miss(*t))) else { return };
-    if depth < 4 && b - a > 1.5 * arc.radius_at(worst) && miss(worst) > bend * median(arc.radii.clone()) {
+    let radius = median(arc.radii.clone());
+    let least = bend * radius * (LONG * radius / (b - a)).min(1.0);
+    if depth < 4 && b - a > 1.5 * arc.radius_at(worst) && miss(worst) > least {
         found.push(worst);
         bends(arc, (a, worst), bend, depth + 1, found);
         bends(arc, (worst, b), bend, depth + 1, found);
@@ -270,4 +274,25 @@ fn leaves_lump(skin: &Skin, skeleton: &CurveSkeleton, at: usize, side: usize) ->
     found.map_or(least, |d| {
         (d + 0.15 * skeleton.arcs[at].radius_at(if side == 0 { d } else { length - d })).min(limit)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::caging::skeleton::curve_skeleton;
+    use crate::fixtures::shapes::square_tube;
+
+    #[test]
+    fn a_slight_bulge_gets_a_node_on_a_long_limb_alone() {
+        for (length, count) in [(10, 2), (30, 3)] {
+            let radius = |x: f64| 1.0 + 0.5 * (std::f64::consts::PI * x / f64::from(length)).sin();
+            let rings: Vec<(f64, f64)> = (0..=length).map(f64::from).map(|x| (x, radius(x))).collect();
+            let (vertices, faces) = square_tube(&rings);
+            let skin = Skin::new(&vertices, &faces).expect("closed");
+            let bones = [1.0, f64::from(length) - 1.0].map(|x| Point::new(x, 0.0, 0.0));
+            let skeleton = curve_skeleton(&skin, &bones, &[[0, 1]], 0.0, &[]).expect("inside");
+            let nodes = control_nodes(&skin, &skeleton, None, Placement::Automatic).expect("two");
+            assert_eq!(nodes.len(), count, "{length}");
+        }
+    }
 }
