@@ -23,6 +23,9 @@ const SEEDS: usize = 20;
 /// Least mean half width of a leaf's section, in radii of its ball (which is 0.3 of the arc's).
 const BLUNT: f64 = 2.2;
 
+/// Neighbouring corners are so far apart, in radii of the inscribed ball: field lines draw together at a nose.
+const DISTINCT: f64 = 0.25;
+
 /// How finely sections are looked for.
 #[derive(Debug, Clone, Copy)]
 pub struct SectionOptions {
@@ -123,7 +126,7 @@ pub(crate) fn section(
     if ring.len() < SEEDS / 2 {
         return None;
     }
-    let corners = corners(&ring, &node.direction, options.corners);
+    let corners = corners(&ring, node, options.corners);
     let mut found = Section { ring, corners, center: Point::zeros() };
     found.widen(node);
     Some(found)
@@ -185,9 +188,9 @@ fn trace(skin: &Skin, field: &Field, mut p: Point, out: Point) -> Option<Point> 
     None
 }
 
-/// `count` corners of the ring, counterclockwise about `direction`.
-fn corners(ring: &[Point], direction: &Point, count: usize) -> Vec<Point> {
-    let (axes, spread) = principal_axes(ring, direction);
+/// `count` corners of the ring, counterclockwise about the node's direction.
+fn corners(ring: &[Point], node: &ControlNode, count: usize) -> Vec<Point> {
+    let (axes, spread) = principal_axes(ring, &node.direction);
     let center = ring.iter().sum::<Point>() / ring.len() as f64;
     let flat: Vec<[f64; 2]> = ring
         .iter()
@@ -200,47 +203,51 @@ fn corners(ring: &[Point], direction: &Point, count: usize) -> Vec<Point> {
         })
         .collect();
     let score = |aim: usize, at: usize| aims[aim][0] * flat[at][0] + aims[aim][1] * flat[at][1];
-    best(ring, count, &score)
+    best(ring, count, DISTINCT * node.radius, &score)
 }
 
 /// The ring points nearest to `targets`, in their order around the ring.
 pub(super) fn toward(ring: &[Point], targets: &[Point]) -> Vec<Point> {
-    best(ring, targets.len(), &|aim: usize, at: usize| -(ring[at] - targets[aim]).norm_squared())
+    best(ring, targets.len(), 0.0, &|aim: usize, at: usize| -(ring[at] - targets[aim]).norm_squared())
 }
 
-/// Distinct points of the ring in cyclic order, one for each aim.
-fn best(ring: &[Point], count: usize, score: &impl Fn(usize, usize) -> f64) -> Vec<Point> {
+/// Points of the ring in cyclic order, one for each aim, neighbours at least `apart` where there are such.
+fn best(ring: &[Point], count: usize, apart: f64, score: &impl Fn(usize, usize) -> f64) -> Vec<Point> {
     // The best increasing choice with gaps of two, from each possible first ring point.
     let (n, gap) = (ring.len(), (ring.len() / (3 * count)).max(1));
+    let next = |a: usize, b: usize| b - a >= gap && (ring[a % n] - ring[b % n]).norm() >= apart;
     let mut best = (f64::NEG_INFINITY, Vec::new());
     for first in 0..n {
-        let (value, chosen) = choose(first, n, gap, count, score);
+        let (value, chosen) = choose(first, n, &next, count, score);
         if value > best.0 {
             best = (value, chosen);
         }
     }
+    if best.1.is_empty() && apart > 0.0 {
+        return self::best(ring, count, 0.0, score);
+    }
     best.1.iter().map(|k| ring[*k % n]).collect()
 }
 
-/// The best places for aims 1.. after aim 0 at `first`, cyclic, at least `gap` apart.
+/// The best places for aims 1.. after aim 0 at `first`, cyclic, each one that may be `next` to the one before.
 fn choose(
     first: usize,
     n: usize,
-    gap: usize,
+    next: &impl Fn(usize, usize) -> bool,
     count: usize,
     score: &impl Fn(usize, usize) -> f64,
 ) -> (f64, Vec<usize>) {
     let mut table = vec![vec![(f64::NEG_INFINITY, 0); n]; count];
     table[0][0] = (score(0, first), 0);
     for aim in 1..count {
-        for at in aim * gap..n {
-            let before = (0..=at - gap).map(|k| (table[aim - 1][k].0, k));
+        for at in aim..n {
+            let before = (0..at).filter(|k| next(first + k, first + at)).map(|k| (table[aim - 1][k].0, k));
             if let Some((value, k)) = before.max_by(|a, b| a.0.total_cmp(&b.0)) {
                 table[aim][at] = (value + score(aim, (first + at) % n), k);
             }
         }
     }
-    let ends = (0..=n - gap).map(|at| (table[count - 1][at].0, at));
+    let ends = (0..n).filter(|at| next(first + at, first + n)).map(|at| (table[count - 1][at].0, at));
     let Some((value, mut at)) = ends.max_by(|a, b| a.0.total_cmp(&b.0)) else {
         return (f64::NEG_INFINITY, Vec::new());
     };
@@ -307,6 +314,32 @@ pub(crate) mod tests {
         }
         let turn = (middle[1] - middle[0]).cross(&(middle[2] - middle[0]));
         assert!(turn.x > 0.0);
+    }
+
+    #[test]
+    fn corners_stay_apart_where_field_lines_draw_together() {
+        // The two farthest points one way are all but one.
+        let mut ring: Vec<Point> = (0..20)
+            .map(|k| (f64::from(k) + 0.5) * std::f64::consts::TAU / 20.0)
+            .map(|angle| Point::new(0.0, angle.cos(), angle.sin()))
+            .collect();
+        ring[4] = Point::new(0.0, 0.003, 3.0);
+        ring[5] = Point::new(0.0, -0.003, 3.0);
+        let node = ControlNode {
+            kind: NodeKind::Bending,
+            arc: 0,
+            place: Point::zeros(),
+            point: Point::zeros(),
+            direction: Point::x(),
+            radius: 1.0,
+            node: 0,
+        };
+        let sides = |corners: &[Point]| {
+            let side = |k: usize| (corners[k] - corners[(k + 1) % 4]).norm();
+            (0..4).map(side).fold(f64::INFINITY, f64::min)
+        };
+        assert!(sides(&corners(&ring, &node, 4)) > DISTINCT);
+        assert!(sides(&corners(&ring, &ControlNode { radius: 0.0, ..node }, 4)) < 0.1);
     }
 
     #[test]
