@@ -108,3 +108,21 @@ def test_a_skeleton_found_in_a_skin_is_one_tree(name, leaves):
         image = nodes * [-1, 1, 1] + [skin[:, 0].min() + skin[:, 0].max(), 0, 0]
         apart = np.linalg.norm(image[:, None] - nodes[None], axis=2)
         assert apart.min(axis=1).max() < 1e-6 * np.linalg.norm(np.ptp(skin, axis=0))
+
+
+@pytest.mark.parametrize("placement", ["automatic", "joints"])
+def test_a_cow_without_bones_gets_legs_ears_horns_and_tail(placement):
+    path = FOLDER / "spot_unrigged.obj"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    lines = [line.split() for line in path.read_text().splitlines() if line]
+    skin = np.array([line[1:4] for line in lines if line[0] == "v"], float)
+    corners = [[int(corner.split("/")[0]) - 1 for corner in line[1:]] for line in lines if line[0] == "f"]
+    faces = np.array([(face[0], *face[k : k + 2]) for face in corners for k in range(1, len(face) - 1)])
+    skeleton = core.extract_skeleton(skin, faces)
+    leaves = np.count_nonzero(np.bincount(skeleton[1].ravel()) == 1)
+    assert leaves == 9
+    _, _, report = core.generate_cage(skin, faces, *skeleton, options={"placement": placement})
+    assert not len(report["dropped_nodes"])
+    assert report["volume_ratio"] < 1.35
+    assert sum(section["kind"] == "leaf" for section in report["sections"]) == leaves

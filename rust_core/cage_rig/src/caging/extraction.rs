@@ -1,25 +1,27 @@
 //! A curve skeleton for a skin that has none: the graph of the parts of level sets.
 //!
-//! The distance along the surface from one of its far ends is cut into bands; each connected part of a
-//! band is a ring around a limb, and becomes a node in its middle; rings that touch are linked
-//! (level set diagrams after Lazarus and Verroust, 1999: a Reeb graph, which has a loop for each
-//! handle and a leaf for each limb). Straight runs are thinned out. `n log n` in the triangles.
+//! A distance along the surface is cut into bands; each connected part of a band is a ring around a limb,
+//! and becomes a node in its middle; rings that touch are linked (level set diagrams after Lazarus and
+//! Verroust, 1999: a Reeb graph, which has a loop for each handle and a leaf for each limb). The mean
+//! distance from all of the surface (Hilaga et al., 2001) grows from the middle of the body to the end of
+//! every limb, and cuts each straight across; around a ring of rings it says nothing, and the
+//! distance from a far end is taken. Straight runs are thinned out. `n log n` in the triangles.
 
 use super::obstacle::{Mesh, Obstacles};
 use super::skin::Skin;
+use super::surface_distance::{along_edges, far_ends, mean_distance, neighbours, smooth};
 use super::symmetry;
 use crate::error::CagingError;
 use crate::mesh::Polygons;
 use crate::points::Point;
-use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap, HashMap};
+use std::collections::{BTreeSet, HashMap};
 
 /// Bands from one end to the other, fewer on a coarse mesh.
 const BANDS: f64 = 48.0;
 /// Edges are no longer, relative to the size.
 const EDGE: f64 = 0.015;
-/// Rounds of smoothing of the distance, which runs along edges, before it is cut.
-const SMOOTHING: usize = 20;
+/// The mean distance has failed where its rings are less round than this part of the others.
+const FAILS: f64 = 0.7;
 /// A tip is near a ball that would reach it with this times its radius.
 const NEAR_BALL: f64 = 1.2;
 /// What is nearer to the skin than this, relative to the size, is at the surface.
@@ -44,9 +46,16 @@ pub fn extract_skeleton(vertices: &[Point], faces: &Polygons) -> Result<Extracte
     mesh.refine(EDGE);
     let Mesh { points, triangles } = mesh;
     let around = neighbours(points.len(), &triangles);
-    let distance = surface_distance(&points, &around, skin.symmetric);
-    let (rings, middle) = rings(&points, &around, &distance, skin.symmetric);
-    let graph = thin(&skin, if skin.symmetric { mirrored(&rings, &middle) } else { rings });
+    let ends = far_ends(&points, &around, skin.symmetric);
+    let cut = |mut distance: Vec<f64>| {
+        smooth(&mut distance, &around);
+        rings(&points, &around, &distance, skin.symmetric)
+    };
+    let mean = cut(mean_distance(&points, &around, &ends, skin.symmetric));
+    let from_end = cut(along_edges(&points, &around, &ends));
+    let fails = roundness(&skin, &points, &mean) < FAILS * roundness(&skin, &points, &from_end);
+    let Rings { graph, middle, .. } = if fails { from_end } else { mean };
+    let graph = thin(&skin, if skin.symmetric { mirrored(&graph, &middle) } else { graph });
     if graph.edges.is_empty() {
         return Err(CagingError::SkeletonEmpty);
     }
@@ -54,78 +63,6 @@ pub fn extract_skeleton(vertices: &[Point], faces: &Polygons) -> Result<Extracte
         nodes: graph.points.iter().map(|p| skin.space.leave(p)).collect(),
         edges: graph.edges.iter().map(|(a, b)| [*a as i64, *b as i64]).collect(),
     })
-}
-
-fn neighbours(count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
-    let mut found = vec![Vec::new(); count];
-    for t in triangles {
-        for k in 0..3 {
-            found[t[k] as usize].push(t[(k + 1) % 3]);
-        }
-    }
-    found
-}
-
-/// Distances along edges from the nearest of the vertices `starts`; infinite on other parts of the
-/// surface.
-fn along_edges(points: &[Point], around: &[Vec<u32>], starts: &[usize]) -> Vec<f64> {
-    let mut best = vec![f64::INFINITY; points.len()];
-    let mut heap: BinaryHeap<_> = starts.iter().map(|start| Reverse((0_u64, *start))).collect();
-    starts.iter().for_each(|start| best[*start] = 0.0);
-    while let Some(Reverse((bits, v))) = heap.pop() {
-        if f64::from_bits(bits) > best[v] {
-            continue;
-        }
-        for w in around[v].iter().map(|w| *w as usize) {
-            let length = best[v] + (points[w] - points[v]).norm();
-            if length < best[w] {
-                best[w] = length;
-                // Distances are not negative, so their bits are in order.
-                heap.push(Reverse((length.to_bits(), w)));
-            }
-        }
-    }
-    best
-}
-
-fn farthest(distance: &[f64]) -> usize {
-    let finite = (0..distance.len()).filter(|v| distance[*v].is_finite());
-    finite.max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a))).unwrap_or(0)
-}
-
-/// Smoothed distances from a far end of the largest part, on a symmetric skin also from its mirror
-/// image unless that is at the other end; infinite elsewhere.
-fn surface_distance(points: &[Point], around: &[Vec<u32>], symmetric: bool) -> Vec<f64> {
-    let mut seen = vec![false; points.len()];
-    let mut largest = (0, 0);
-    for start in (0..points.len()).filter(|v| !around[*v].is_empty()) {
-        if !seen[start] {
-            let of_part = along_edges(points, around, &[start]);
-            let count = of_part.iter().filter(|d| d.is_finite()).count();
-            seen.iter_mut().zip(&of_part).for_each(|(s, d)| *s |= d.is_finite());
-            largest = largest.max((count, start));
-        }
-    }
-    let reached = along_edges(points, around, &[largest.1]);
-    let mut starts = vec![farthest(&reached)];
-    if symmetric {
-        let image = symmetry::image(&points[starts[0]]);
-        let apart = |v: usize| (points[v] - image).norm_squared();
-        let part = (0..points.len()).filter(|v| reached[*v].is_finite());
-        starts.extend(part.min_by(|a, b| apart(*a).total_cmp(&apart(*b))));
-        let first = along_edges(points, around, &starts[..1]);
-        let far = first[farthest(&first)];
-        starts.retain(|v| first[*v] < 0.5 * far);
-    }
-    let mut distance = along_edges(points, around, &starts);
-    for _ in 0..SMOOTHING {
-        let old = distance.clone();
-        for (v, near) in around.iter().enumerate().filter(|(_, near)| !near.is_empty()) {
-            let sum: f64 = near.iter().map(|w| old[*w as usize]).sum();
-            distance[v] = 0.5 * (old[v] + sum / near.len() as f64);
-        }
-    }
-    distance
 }
 
 /// A graph while it is thinned out.
@@ -152,10 +89,27 @@ impl Graph {
     }
 }
 
-/// The middles of the connected parts of bands, linked where they touch, and whether each reaches the
-/// plane x = 0. `half`: of what is on its greater side, where parts that are one in the whole and reach
-/// the plane are one.
-fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64], half: bool) -> (Graph, Vec<bool>) {
+/// The middles of the connected parts of bands, linked where they touch.
+struct Rings {
+    graph: Graph,
+    /// Whether each reaches the plane x = 0.
+    middle: Vec<bool>,
+    /// The ring of each vertex.
+    at: Vec<usize>,
+}
+
+/// How round rings are about their middles, from 0 to 1 over all of the surface.
+fn roundness(skin: &Skin, points: &[Point], rings: &Rings) -> f64 {
+    let middles = &rings.graph.points;
+    let depth: Vec<f64> = middles.iter().map(|p| skin.depth(p).max(0.0)).collect();
+    let of = |(v, ring): (usize, &usize)| (depth[*ring] / (points[v] - middles[*ring]).norm()).min(1.0);
+    let found: Vec<f64> = rings.at.iter().enumerate().filter(|(_, r)| **r != usize::MAX).map(of).collect();
+    found.iter().sum::<f64>() / found.len().max(1) as f64
+}
+
+/// Rings of `distance`. `half`: of what is on the greater side of the plane, where parts that are one in
+/// the whole and reach the plane are one.
+fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64], half: bool) -> Rings {
     let far = distance.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
     // No edge may reach past the next band, or a ring falls apart.
     let reach =
@@ -187,7 +141,7 @@ fn rings(points: &[Point], around: &[Vec<u32>], distance: &[f64], half: bool) ->
             graph.link(at[v], at[w]);
         }
     }
-    (graph, middle)
+    Rings { graph, middle, at }
 }
 
 /// For each vertex that is `inside` the number of its part: what is connected and `alike`.

@@ -26,6 +26,7 @@ mod rings;
 mod sections;
 pub(crate) mod skeleton;
 mod skin;
+mod surface_distance;
 mod symmetry;
 mod template;
 mod tightening;

@@ -57,19 +57,40 @@ const RINGS_AT: f64 = 0.6;
 const RINGS: [f64; 3] = [0.3, 0.45, 0.6];
 const RING_POINTS: usize = 16;
 
+/// Steps of a way, and of how far something is looked for around a hole.
+const STEPS: usize = 8;
+/// Of fourteen ways out of a hole, so many end in skin.
+const CLOSED: usize = 12;
+
 /// Whether the skin from `base` to `tip` is a lump, not a limb: most ways from the middle meet skin as
-/// far away as it is long. Holes in it, as a mouth, don't count.
+/// far away as it is long. Holes in it, as a mouth, don't count; the open, as between two legs, does.
 fn is_lump(skin: &Skin, base: &Point, tip: &Point) -> bool {
     let way = tip - base;
     let Some(along) = way.try_normalize(1e-9) else { return true };
     let across = along.cross(&if along.x.abs() < 0.6 { Point::x() } else { Point::y() }).normalize();
     let up = along.cross(&across);
+    let (middle, length) = (base + way * RINGS_AT, way.norm());
     let filled = (0..RING_POINTS).filter(|k| {
         let (sin, cos) = (*k as f64 * std::f64::consts::TAU / RING_POINTS as f64).sin_cos();
-        let out = (across * cos + up * sin) * way.norm();
-        RINGS.iter().any(|part| skin.contains(&(base + way * RINGS_AT + out * *part)))
+        let out = (across * cos + up * sin) * length;
+        let far = RINGS.iter().rev().find(|part| skin.contains(&(middle + out * **part)));
+        far.is_some_and(|part| {
+            let mut between = (1..STEPS).map(|i| middle + out * (*part * i as f64 / STEPS as f64));
+            between.all(|p| skin.contains(&p) || is_hole(skin, &p, length))
+        })
     });
     filled.count() * 2 > RING_POINTS
+}
+
+/// Whether nearly all ways from `point` meet skin within `reach`.
+fn is_hole(skin: &Skin, point: &Point, reach: f64) -> bool {
+    let signs = [-1.0, 1.0];
+    let axes = [Point::x(), Point::y(), Point::z()].into_iter().flat_map(|axis| signs.map(|s| axis * s));
+    let corners = signs.into_iter().flat_map(|x| signs.into_iter().map(move |y| (x, y)));
+    let corners = corners.flat_map(|(x, y)| signs.map(|z| Point::new(x, y, z).normalize()));
+    let ends =
+        |way: &Point| (1..=STEPS).any(|i| skin.contains(&(point + way * (reach * i as f64 / STEPS as f64))));
+    axes.chain(corners).filter(ends).count() >= CLOSED
 }
 
 /// Removes all that is beyond one branching node where it is in one lump with it: that becomes a
@@ -157,6 +178,7 @@ mod tests {
     use super::*;
     use crate::caging::skeleton::curve_skeleton;
     use crate::fixtures::shapes::square_tube;
+    use crate::mesh::Polygons;
 
     #[test]
     fn what_branches_around_a_mouth_is_dropped_and_named() {
@@ -183,5 +205,20 @@ mod tests {
         };
         assert!(lump(1.9));
         assert!(!lump(3.9));
+    }
+
+    #[test]
+    fn a_limb_among_others_is_no_lump() {
+        let (one, faces) = square_tube(&[(0.0, 0.3), (2.0, 0.3), (4.0, 0.3)]);
+        let (mut vertices, mut all) = (Vec::new(), Polygons::default());
+        for place in 0..9 {
+            let aside = Point::new(0.0, f64::from(place % 3 - 1), f64::from(place / 3 - 1));
+            all.corners.extend(faces.corners.iter().map(|corner| corner + vertices.len() as i64));
+            all.sizes.extend(&faces.sizes);
+            vertices.extend(one.iter().map(|p| p + aside));
+        }
+        let skin = Skin::new(&vertices, &all).expect("closed");
+        let [base, tip] = [0.5, 3.9].map(|x| skin.space.enter(&Point::new(x, 0.0, 0.0)));
+        assert!(!is_lump(&skin, &base, &tip));
     }
 }
