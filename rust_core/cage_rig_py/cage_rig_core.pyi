@@ -169,7 +169,10 @@ class CoupledRig:
     def start_method(self, name: str) -> MethodJob: ...
     @property
     def method(self) -> str: ...
-    half_weights: bool  # frames keep weights of the cage in 16 bits; at any time
+    @property
+    def half_weights(self) -> bool: ...  # whether frames keep weights of the cage in 16 bits; set at any time
+    @half_weights.setter
+    def half_weights(self, half: bool) -> None: ...
     def posed_skins(
         self,
         cages: ArrayLike,  # (#F, #C, 3), or (#C, 3) for a still cage
