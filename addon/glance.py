@@ -54,7 +54,7 @@ def seen(cage: bpy.types.Object) -> tuple[object, ...] | None:
         obj = skin.object
         if obj is None:
             return None
-        found += (obj.users, obj.session_uid, obj.mode, len(obj.data.vertices), skin.mask)
+        found += (obj.users, obj.session_uid, obj.mode, obj.data.users, len(obj.data.vertices), skin.mask)
         for mod in obj.modifiers:
             found += (mod.type, mod.show_viewport, mod.show_render)
     return tuple(found)

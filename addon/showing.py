@@ -17,7 +17,7 @@ def write(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgra
     settings = cage.cage_rig
     plain = running.seen is not None
     live = [(k, skin.object) for k, skin in enumerate(settings.skins)] if plain else health.live_skins(cage)
-    skins.write(live, cage, running.session, depsgraph, running.written, running.places)
+    skins.write(live, cage, running.session, depsgraph, running.written, running.places, plain=plain)
     posed = settings.posed_cage
     running.stale = not _is_shown(posed, depsgraph)
     if not running.stale:

@@ -182,10 +182,12 @@ def write(
     depsgraph: bpy.types.Depsgraph,
     written: Written,
     known: Places,
+    *,
+    plain: bool,
 ) -> None:
     """Feed posed points to those of the `skins` that this rig places and whose result changed since `written`.
 
-    A skin in Edit Mode waits.
+    A skin in Edit Mode waits. `plain`: nothing but cage and bones has moved since the last time.
     """
     for index, obj in skins:
         if obj.data.is_editmode or obj.cage_rig.owner != cage:
@@ -193,7 +195,8 @@ def write(
             continue
         at = place(cage, index, depsgraph, known)
         state = (session.revision, at.key)
-        if written.get(index) == state and modifier.is_fed(obj):
+        was_own = plain or modifier.take_own(obj)
+        if was_own and written.get(index) == state and modifier.is_fed(obj):
             continue
         points = session.posed_skin(index)
         if at.inverse is not None:

@@ -160,7 +160,9 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
     source, bones = cage.evaluated_get(depsgraph), cage.cage_rig.armature.evaluated_get(depsgraph)
     if not (source.is_evaluated and bones.is_evaluated):
         return  # in no view of this depsgraph: nothing of it is shown
-    if running is None or running.bind != binding.key(cage.cage_rig):  # an undo may bring back another bind
+    if running is None or (
+        not known and running.bind != binding.key(cage.cage_rig)
+    ):  # an undo brings back another bind
         running = _running[cage.session_uid] = Running.of(cage, binding.bound_anew(cage))
         event = Event.RESTORED
     elif not known:

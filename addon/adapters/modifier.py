@@ -111,7 +111,6 @@ def write(skin: bpy.types.Object, points: Points) -> None:
     if _is_linked(mesh) or _is_shared(mesh):
         positions.write_base(_own_feed(skin).data, points)
         return
-    set_inputs(_leader(skin), {"Use Feed": False, "Feed": None})  # it was shared
     attribute = mesh.attributes.get(ATTRIBUTE)
     if attribute is None:
         attribute = mesh.attributes.new(ATTRIBUTE, "FLOAT_VECTOR", "POINT")
@@ -119,11 +118,20 @@ def write(skin: bpy.types.Object, points: Points) -> None:
     mesh.update_tag()
 
 
+def take_own(skin: bpy.types.Object) -> bool:
+    """Let the modifier take what is written to the skin's own mesh, where that was shared until now; returns whether
+    it was so already.
+    """
+    if _is_linked(skin.data) or _is_shared(skin.data):
+        return True
+    return set_inputs(_leader(skin), {"Use Feed": False, "Feed": None})
+
+
 def is_fed(skin: bpy.types.Object) -> bool:
     """Whether `write` has written to the skin, and nothing has taken that away."""
     if _is_linked(skin.data) or _is_shared(skin.data):
         return _feed(skin) is not None
-    return ATTRIBUTE in skin.data.attributes and not read(_leader(skin), "Use Feed")
+    return ATTRIBUTE in skin.data.attributes
 
 
 def read_fed(skin: bpy.types.Object) -> Points | None:

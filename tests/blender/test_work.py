@@ -72,6 +72,22 @@ def test_frames_are_not_looked_at_closely_and_edits_are(bar: Rig, looks: list[st
     assert looks == [bar.cage.name]
 
 
+def test_frames_read_no_inputs_of_the_modifier(bar: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    import bl_ext.user_default.cage_rig.adapters.modifier as modifier
+
+    key_pose(bar)
+    bpy.context.scene.frame_set(2)
+    found: list[str] = []
+    read = modifier.read
+    monkeypatch.setattr(modifier, "read", lambda which, name: found.append(name) or read(which, name))
+    for frame in range(3, 9):
+        bpy.context.scene.frame_set(frame)
+    assert not found  # each takes as long as a product of a small character
+    bar.armature.pose.bones[1].location.x = 0.1
+    update()
+    assert "Use Feed" in found
+
+
 def grow_before(rig: Rig) -> None:
     """Something that a frame has to be told of: a modifier before ours."""
     modifier = rig.skin.modifiers.new("Subdivision", "SUBSURF")
