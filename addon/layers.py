@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bpy
 
-from .adapters import dependence, modifier
+from .adapters import armature, dependence, modifier
 
 
 def below(cage: bpy.types.Object) -> list[bpy.types.Object]:
@@ -98,4 +98,5 @@ def is_own(obj: bpy.types.Object) -> bool:
 
 
 def _read_from(cage: bpy.types.Object) -> dependence.Rig:
-    return cage, cage.cage_rig.armature, [joint.name for joint in cage.cage_rig.joints]
+    obj = cage.cage_rig.armature
+    return cage, obj, armature.ends(obj.data, [joint.name for joint in cage.cage_rig.joints])

@@ -214,7 +214,7 @@ def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event:
     if trouble:
         _pause(cage, trouble)
         return False
-    if anew:
+    if anew or depsgraph.id_type_updated("ARMATURE"):  # bones may have other parents
         layers.wait(cage)
     stack.let_suspended_rest([cage, *layers.skins_of(cage)])
     return True

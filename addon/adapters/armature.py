@@ -89,6 +89,19 @@ def bone_names(armature: bpy.types.Armature) -> list[str]:
     return [bone.name for bone in armature.bones]
 
 
+def ends(armature: bpy.types.Armature, names: list[str]) -> list[str]:
+    """Those of these bones from which none of them descends. What waits for them waits for all: Blender evaluates a
+    bone after its parent.
+    """
+    bones, above = armature.bones, set()
+    for name in names:
+        bone = bones[name].parent if name in bones else None
+        while bone is not None and bone.name not in above:
+            above.add(bone.name)
+            bone = bone.parent
+    return [name for name in names if name not in above]
+
+
 def new_refit_armature(name: str, source: bpy.types.Armature) -> bpy.types.Armature:
     """A copy of the armature with the same bones, parentless and unconnected: bones are freed by `free_bones`."""
     armature = source.copy()

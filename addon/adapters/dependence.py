@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender has to evaluate for a rig wherever it shows an object, however cage and bones are hidden.
 
-Blender evaluates what is hidden only for what depends on it: the bones of a hidden armature for what depends on each of
-them. A driver that reads every bone and the cage and gives what was there anyway is such a dependency; unlike a
-constraint it draws no relationship lines. On a property that means nothing to a mesh it costs no more: the mesh itself
-does not wait, and is evaluated once a frame, when its points are written. Where others depend on the object in turn it
-has to be on the object's place.
+Blender evaluates what is hidden only for what depends on it: bones of a hidden armature for what depends on them, and
+their parents for them. A driver that reads the last bones and the cage and gives what was there anyway is such a
+dependency; unlike a constraint it draws no relationship lines. Each bone that it reads costs time in every frame. On a
+property that means nothing to a mesh it costs no more: the mesh itself does not wait, and is evaluated once a frame,
+when its points are written. Where others depend on the object in turn it has to be on the object's place.
 """
 
 from __future__ import annotations

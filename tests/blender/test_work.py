@@ -220,6 +220,24 @@ def test_a_frame_evaluates_the_skin_once_when_its_points_are_written(bar: Rig, f
     assert np.abs(shown(bar.skin) - before).max() > 1e-3
 
 
+def awaited(rig: Rig) -> list[str]:
+    """The bones that the skin's driver reads."""
+    (curve,) = rig.skin.animation_data.drivers
+    return [variable.targets[0].bone_target for variable in curve.driver.variables if variable.type == "TRANSFORMS"]
+
+
+def test_a_skin_waits_for_the_last_bones_alone_whatever_their_parents(bar: Rig) -> None:
+    assert awaited(bar) == ["upper"]
+    key_pose(bar)
+    select([bar.armature], bar.armature)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = bar.armature.data.edit_bones
+    bones["upper"].use_connect, bones["upper"].parent = False, None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    update()
+    assert awaited(bar) == ["lower", "upper"]
+
+
 def test_hidden_cages_and_bones_are_evaluated_for_whatever_is_shown(bar: Rig) -> None:
     key_pose(bar)
     bpy.context.scene.frame_set(6)
