@@ -32,6 +32,7 @@ __all__ = [
     "CoupledRig",
     "MethodJob",
     "PanicException",
+    "Playback",
     "PoseError",
     "SkeletonError",
     "SkinError",
@@ -213,6 +214,30 @@ class CoupledRig:
     @property
     def work(self) -> Work: ...
     def _panic_for_tests(self) -> None: ...
+
+@final
+class Playback:
+    """Frames of a rig from arrays into arrays, which it keeps; all of them are float32, and skin is contiguous."""
+
+    def __new__(
+        cls,
+        rig: CoupledRig,
+        bones: Bones,
+        refit: Bones | None = None,  # those that refit_pose is for
+        *,
+        cage: NDArray[np.float32],  # (#C, 3), read
+        posed: NDArray[np.float32],  # (#J, 4, 4), where bones are, read
+        skin: NDArray[np.float32],  # (#M, 3), written, as the next
+        posed_cage: NDArray[np.float32],  # (#C, 3)
+        refit_pose: NDArray[np.float32],  # (#J, 4, 4), as CoupledRig.refit_pose gives it
+    ) -> Playback: ...
+    def play(
+        self,
+        influence: float = 1.0,  # the part of the cage's movement that counts
+        *,
+        fitted: bool = True,  # posed_cage is written too
+        again: bool = False,  # written where nothing was new too
+    ) -> bool: ...  # whether anything of it was new
 
 @final
 class BindJob:

@@ -40,7 +40,7 @@ def test_names_and_signatures_agree():
     assert in_module == set(functions) | (set(classes) - typed)
     for name, node in functions.items():
         assert signature(getattr(core, name)) == parameters(node), name
-    for name in ("CoupledRig", "BindJob", "MethodJob", "CagingJob", "CageGenerator"):
+    for name in ("CoupledRig", "Playback", "BindJob", "MethodJob", "CagingJob", "CageGenerator"):
         members = {node.name: node for node in classes[name].body if isinstance(node, ast.FunctionDef)}
         check_class(getattr(core, name), members)
 

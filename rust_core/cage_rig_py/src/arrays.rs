@@ -4,9 +4,9 @@
 
 use crate::errors::ArrayError;
 use cage_rig::{Matrix3, Point, Polygons, Rows, SkinWeights, Transform};
-use numpy::ndarray::ArrayViewMutD;
+use numpy::ndarray::{ArrayView1, ArrayView2, ArrayViewMutD, Dimension};
 use numpy::{
-    Element, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
+    Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
     PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ struct Block<T> {
 }
 
 /// An expected shape: `None` stands for any length, named in the message.
-type Shape<'a> = &'a [(&'a str, Option<usize>)];
+pub(crate) type Shape<'a> = &'a [(&'a str, Option<usize>)];
 
 /// `argument` as an aligned array of native byte order and expected shape.
 fn array<'py>(
@@ -82,16 +82,16 @@ fn floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Bl
 
 fn finite_floats(value: &Bound<'_, PyAny>, argument: &str, shape: Shape) -> PyResult<Block<f64>> {
     let block = floats(value, argument, shape)?;
-    match block.data.iter().position(|x| x.is_nan() || x.abs() > cage_rig::LARGEST) {
-        None => Ok(block),
-        Some(at) => {
-            let width: usize = block.shape[1..].iter().product();
-            let row = at / width;
-            Err(ArrayError::new_err(format!(
-                "{argument} has a value that is not finite or beyond 1e12 in row {row}"
-            )))
-        }
+    let width: usize = block.shape[1..].iter().product();
+    block.data.iter().enumerate().try_for_each(|(at, x)| usable(*x, argument, at / width.max(1)))?;
+    Ok(block)
+}
+
+fn usable(x: f64, argument: &str, row: usize) -> PyResult<()> {
+    if x.abs() <= cage_rig::LARGEST {
+        return Ok(());
     }
+    Err(ArrayError::new_err(format!("{argument} has a value that is not finite or beyond 1e12 in row {row}")))
 }
 
 /// Integers of any width, one list.
@@ -167,15 +167,16 @@ pub(crate) fn transforms_of_frames(value: &Bound<'_, PyAny>, joints: usize) -> P
 }
 
 fn affine(block: &Block<f64>, joints: usize) -> PyResult<Vec<Transform>> {
-    let read = |(at, m): (usize, &[f64])| {
-        // Single-precision inverses leave some rounding here.
-        if m[12..].iter().zip([0.0, 0.0, 0.0, 1.0]).any(|(found, wanted)| (found - wanted).abs() > 1e-5) {
-            return Err(crate::errors::raise(cage_rig::PoseError::NotAffine { joint: at % joints }));
-        }
-        let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
-        Ok(Transform { linear, translation: Point::new(m[3], m[7], m[11]) })
-    };
-    block.data.chunks_exact(16).enumerate().map(read).collect()
+    block.data.chunks_exact(16).enumerate().map(|(at, m)| transform(m, at % joints)).collect()
+}
+
+fn transform(m: &[f64], joint: usize) -> PyResult<Transform> {
+    // Single-precision inverses leave some rounding here.
+    if m[12..].iter().zip([0.0, 0.0, 0.0, 1.0]).any(|(found, wanted)| (found - wanted).abs() > 1e-5) {
+        return Err(crate::errors::raise(cage_rig::PoseError::NotAffine { joint }));
+    }
+    let linear = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+    Ok(Transform { linear, translation: Point::new(m[3], m[7], m[11]) })
 }
 
 /// Cages of frames, `#F by #C by 3`, or one for all of them, `#C by 3`.
@@ -263,6 +264,45 @@ pub(crate) fn from_frame<'py>(py: Python<'py>, points: &[[f32; 3]]) -> PyResult<
 /// A fresh matrix.
 pub(crate) fn from_rows<'py>(py: Python<'py>, rows: &Rows) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, rows.as_slice()).reshape([rows.len(), rows.columns()])
+}
+
+/// An array of float32 and exactly this shape that is kept, for frames to read from or to write to.
+pub(crate) fn kept<D: Dimension>(
+    value: &Bound<'_, PyAny>,
+    argument: &str,
+    shape: Shape,
+) -> PyResult<Py<PyArray<f32, D>>> {
+    let found = array(value, argument, FLOATS, shape)?;
+    match found.cast::<PyArray<f32, D>>() {
+        Ok(single) if found.is(value) => Ok(single.clone().unbind()),
+        _ => Err(refuse(argument, "float32", shape, &found)),
+    }
+}
+
+/// Points of a kept array, `n by 3`.
+pub(crate) fn kept_points(
+    array: &Bound<'_, PyArray2<f32>>,
+    argument: &str,
+    each: impl Fn(Point, usize) -> Point,
+) -> PyResult<Vec<Point>> {
+    let array = array.try_readonly()?;
+    let read = |(row, p): (usize, ArrayView1<f32>)| {
+        let point = Point::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
+        point.iter().try_for_each(|x| usable(*x, argument, row))?;
+        Ok(each(point, row))
+    };
+    array.as_array().outer_iter().enumerate().map(read).collect()
+}
+
+/// Affine matrices of a kept array, `n by 4 by 4`.
+pub(crate) fn kept_matrices(array: &Bound<'_, PyArray3<f32>>, argument: &str) -> PyResult<Vec<Transform>> {
+    let array = array.try_readonly()?;
+    let read = |(row, m): (usize, ArrayView2<f32>)| {
+        let m: [f64; 16] = std::array::from_fn(|k| f64::from(m[[k / 4, k % 4]]));
+        m.iter().try_for_each(|x| usable(*x, argument, row))?;
+        transform(&m, row)
+    };
+    array.as_array().outer_iter().enumerate().map(read).collect()
 }
 
 /// A writable array of the caller's, `n by 3` or flat.

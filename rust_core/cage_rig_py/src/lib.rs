@@ -8,6 +8,7 @@ mod errors;
 mod functions;
 mod input;
 mod jobs;
+mod playback;
 mod rig;
 
 use pyo3::prelude::*;
@@ -19,6 +20,7 @@ fn cage_rig_core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PanicException", module.py().get_type::<pyo3::panic::PanicException>())?;
     module.add_class::<rig::CoupledRig>()?;
     module.add_class::<bones::Bones>()?;
+    module.add_class::<playback::Playback>()?;
     module.add_class::<jobs::BindJob>()?;
     module.add_class::<jobs::MethodJob>()?;
     functions::add_to(module)?;

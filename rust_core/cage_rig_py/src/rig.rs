@@ -19,9 +19,9 @@ use std::sync::{Arc, Mutex};
 #[derive(Clone)]
 pub(crate) struct CoupledRig {
     rig: Arc<Mutex<cage_rig::CoupledRig>>,
-    joints: usize,
-    cage_vertices: usize,
-    skin_vertices: usize,
+    pub(crate) joints: usize,
+    pub(crate) cage_vertices: usize,
+    pub(crate) skin_vertices: usize,
 }
 
 impl CoupledRig {

@@ -46,23 +46,39 @@ impl CoupledRig {
 
     /// Posed skin M′, `#M by 3`.
     pub fn posed_skin(&mut self) -> &[[f32; 3]] {
-        self.rest_skin();
         if self.stale.posed_skin {
-            let needed = self.centers.as_mut().filter(|_| self.method.centers);
-            let centers = needed.map_or(&[][..], |centers| {
-                let pass = centers.update(&self.rest_cage, &self.ground.confines(&self.binding));
-                self.work.center_passes += usize::from(pass.is_some());
-                self.work.center_column_passes += usize::from(pass == Some(Pass::Columns));
-                centers.centers()
-            });
-            let (path, weights) = (self.binding.path, &self.binding.frame_weights);
-            let (transforms, rest_skin) = (&self.transforms, &self.rest_skin);
-            let input = SkinningInput { path, transforms, weights, rest_skin, centers };
-            (self.method.pose)(&input, &mut self.buffers.bones, &mut self.posed_skin);
-            self.work.skin_passes += 1;
+            let mut posed = std::mem::take(&mut self.posed_skin);
+            self.pose_into(&mut posed);
+            self.posed_skin = posed;
             self.stale.posed_skin = false;
         }
         &self.posed_skin
+    }
+
+    /// Writes the posed skin M′ into `posed` (`#M by 3`) and keeps none: a frame that is shown elsewhere is
+    /// made there.
+    pub fn posed_skin_into(&mut self, posed: &mut [[f32; 3]]) {
+        if self.stale.posed_skin {
+            self.pose_into(posed);
+        } else {
+            posed.copy_from_slice(&self.posed_skin);
+        }
+    }
+
+    fn pose_into(&mut self, posed: &mut [[f32; 3]]) {
+        self.rest_skin();
+        let needed = self.centers.as_mut().filter(|_| self.method.centers);
+        let centers = needed.map_or(&[][..], |centers| {
+            let pass = centers.update(&self.rest_cage, &self.ground.confines(&self.binding));
+            self.work.center_passes += usize::from(pass.is_some());
+            self.work.center_column_passes += usize::from(pass == Some(Pass::Columns));
+            centers.centers()
+        });
+        let (path, weights) = (self.binding.path, &self.binding.frame_weights);
+        let (transforms, rest_skin) = (&self.transforms, &self.rest_skin);
+        let input = SkinningInput { path, transforms, weights, rest_skin, centers };
+        (self.method.pose)(&input, &mut self.buffers.bones, posed);
+        self.work.skin_passes += 1;
     }
 
     /// Posed cage C′, `#C by 3`.
