@@ -48,6 +48,11 @@ def is_by_hand(cage: bpy.types.Object) -> bool:
     return cage.session_uid in _by_hand
 
 
+def is_due(session: Session, name: str) -> bool:
+    """Whether `use` has something to do for this rig, or for any."""
+    return name != session.method or bool(_by_hand or _choices)
+
+
 def use(cage: bpy.types.Object, session: Session, name: str, *, later: bool) -> None:
     """Let the session skin by this method: at once, or when it is ready where that takes long and may be `later`."""
     uid = cage.session_uid

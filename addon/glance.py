@@ -68,6 +68,7 @@ def is_plain(cage: bpy.types.Object) -> bool:
         return False
     return settings.state == "LIVE" and all(
         skin.object.users_collection
+        and skin.object.cage_rig.owner == cage
         and len(modifier.ours(skin.object)) == 1
         and not stack.reads_back(skin.object)
         and not skin.mask

@@ -50,8 +50,10 @@ def find(key: Key) -> bpy.types.Object | None:
 
 
 def _cages() -> list[bpy.types.Object]:
-    if not all(_is_same(find(key), uid) for key, uid in _found.names.items()):  # renamed, replaced or gone
-        _look()
+    found = [find(key) for key in _found.names]
+    if all(_is_same(cage, uid) for cage, uid in zip(found, _found.names.values(), strict=True)):
+        return found
+    _look()  # renamed, replaced or gone
     return [bpy.data.objects[key] for key in _found.names]
 
 

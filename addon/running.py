@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import binding, glance, skins
-from .session import Session
+from .adapters import positions
+from .session import Playback, Session, SessionError
 
 Points = NDArray[np.float32]
 Matrix = NDArray[np.float64]
@@ -40,6 +41,7 @@ class Running:
     memory: bytes = b""  # what the edit mesh of the posed cage remembers
     refit_bones: Any = None  # the core's, once they were read
     bones: glance.Bones | None = None  # as last read
+    playback: Playback | None = None  # of the frames since the last close look
     seen: tuple[object, ...] | None = None  # the rig at the last close look; None: look closely at the next frame too
     note: str = ""  # what the artist should know, as of the last close look
     worlds: bytes = b""  # where its objects were, see placing
@@ -60,6 +62,21 @@ class Running:
         """Take over where the file says that the cage is in rig space."""
         matrix = np.array(cage.cage_rig.cage_to_rig, np.float64)
         self.cage_to_rig = None if np.array_equal(matrix, np.eye(4)) else matrix
+
+    def take_rest(self, rest: Points) -> bool:
+        """Take the rest cage that was read. Whether it is another one than that of the last update, or than that which
+        an edit of the posed cage wrote.
+        """
+        if len(rest) != len(self.session.snapshot.cage):
+            counts = f"{len(rest)} vertices of {len(self.session.snapshot.cage)}"
+            raise SessionError(f"its modifiers make {counts}; switch them off")
+        if self.cage_wanted is not None:
+            known = positions.close(rest, self.cage_wanted, 1e-6 * self.session.size)
+        else:
+            known = self.cage is not None and positions.same(rest, self.cage)
+        if not known:
+            self.cage, self.cage_wanted = rest, None
+        return not known
 
     def wanted(self) -> Points:
         """The rest cage that Blender has, or will have when what was written is read."""

@@ -105,14 +105,17 @@ class Session:
         """Bind, or take the result of a job that binds `snapshot`."""
         self.snapshot = snapshot
         skins = snapshot.skins
-        counts = [len(skin.points) for skin in skins]
         self.starts = _starts(skins)
         self.rig = cage_rig_core.CoupledRig(**_to_core(snapshot)) if job is None else job.result()
         self.influence = 1.0
-        self._half_weights = False
+        self.method = str(self.rig.method)  # how bones deform the skin
+        self.half_weights = False  # the cage's weights are kept in 16 bits
         self.revision = 0  # grows whenever a result may have changed
-        self._buffers = [np.empty((count, 3), np.float32) for count in counts]
+        self.points = np.empty((self.starts[-1], 3), np.float32)  # of all skins
+        self.shown = -1  # revision of all that `points` has, where a frame was played into it
+        self._buffers = [self.points[start:end] for start, end in itertools.pairwise(self.starts.tolist())]
         self._offsets: list[Points | None] = [None] * len(skins)
+        self.is_offset = False  # one of them is something
         self._lower: list[Points | None] = [None] * len(skins)  # what the rig below moves the skins by
         self._masks: list[Mask | None] = [None] * len(skins)
         self._below: tuple[Session, int] | None = None
@@ -159,15 +162,16 @@ class Session:
     @_door
     def set_method(self, name: str) -> None:
         """Choose how bones deform the skin, one of the core's `skinning_methods()`; free where it is so already."""
-        if name != self.rig.method:
+        if name != self.method:
             self.rig.set_method(name)
+            self.method = name
             self.revision += 1
 
     @_door
     def keep_half_weights(self, half: bool) -> None:
         """Keep the cage's weights in 16 bits, or not; free where it is so already."""
-        if half != self._half_weights:
-            self.rig.half_weights = self._half_weights = half
+        if half != self.half_weights:
+            self.rig.half_weights = self.half_weights = half
             self.revision += 1
 
     @_door
@@ -179,12 +183,8 @@ class Session:
     def take_method(self, job: cage_rig_core.MethodJob) -> None:
         """Choose the method that a job has prepared; waits for it."""
         job.result()
+        self.method = str(self.rig.method)
         self.revision += 1
-
-    @property
-    def method(self) -> str:
-        """How bones deform the skin."""
-        return str(self.rig.method)
 
     @_door
     def edit_posed_cage(self, posed_cage: Points) -> NDArray[np.float64]:
@@ -212,6 +212,7 @@ class Session:
         if all(_same(new, old) for new, old in zip(offsets, self._offsets, strict=True)):
             return
         self._offsets = offsets
+        self.is_offset = any(offset is not None for offset in offsets)
         self._offset()
 
     def _offset(self) -> None:
@@ -284,7 +285,8 @@ class Session:
     @_door
     def posed_skin(self, index: int) -> Points:
         """Deformed points of one skin, `#M by 3` in rig space. The buffer is reused by the next call."""
-        self.rig.posed_skin_into(self._buffers[index], start=int(self.starts[index]))
+        if self.shown != self.revision:
+            self.rig.posed_skin_into(self._buffers[index], start=int(self.starts[index]))
         return self._buffers[index]
 
     @_door
@@ -343,6 +345,41 @@ class Session:
         at the refit joint.
         """
         return self.rig.refit_pose(bones)
+
+
+class Playback:
+    """Frames of a session without an array made for them: what they come from is filled in, what they show is there."""
+
+    @_door
+    def __init__(self, session: Session, bones: Bones, refit: Bones | None) -> None:
+        """Of the animation's bones, and of those of the refit armature where there is one."""
+        count, cage = len(session.snapshot.heads), session.snapshot.cage
+        self.cage = np.empty_like(cage)  # rest cage, `#C by 3` in rig space, filled in
+        self.bones = np.empty((count, 4, 4), np.float32)  # posed, acting on rows as Blender has them, filled in
+        self.posed_cage = np.empty_like(cage)  # `#C by 3`, shown
+        self.refit_pose = None if refit is None else np.empty((count, 4, 4), np.float32)  # acting on rows, shown
+        self._session, self._filled = session, False
+        self._core = cage_rig_core.Playback(
+            session.rig,
+            bones,
+            refit,
+            cage=self.cage,
+            posed=self.bones.transpose(0, 2, 1),
+            skin=session.points,
+            posed_cage=self.posed_cage,
+            refit_pose=np.empty_like(self.bones) if self.refit_pose is None else self.refit_pose.transpose(0, 2, 1),
+        )
+
+    @_door
+    def play(self, influence: float, *, fitted: bool, again: bool) -> None:
+        """Play what was filled in. The posed cage is made where it is `fitted`; nothing is made where nothing is new,
+        but what is to be shown `again`.
+        """
+        session = self._session
+        again |= session.shown != session.revision or not self._filled
+        session.influence = influence
+        session.revision += self._core.play(influence, fitted=fitted, again=again)
+        session.shown, self._filled = session.revision, True
 
 
 class BindJob:

@@ -8,6 +8,7 @@ import bpy
 from . import binding, health, skins
 from .adapters import armature, positions
 from .running import Running
+from .session import Session
 
 
 def write(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> None:
@@ -15,18 +16,16 @@ def write(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgra
     not fitted, and `running` is `stale` then.
     """
     settings = cage.cage_rig
-    plain = running.seen is not None
-    live = [(k, skin.object) for k, skin in enumerate(settings.skins)] if plain else health.live_skins(cage)
-    skins.write(live, cage, running.session, depsgraph, running.written, running.places, plain=plain)
+    live = health.live_skins(cage)
+    skins.write(live, cage, running.session, depsgraph, running.written, running.places)
     posed = settings.posed_cage
-    running.stale = not _is_shown(posed, depsgraph)
+    running.stale = not is_seen(posed, depsgraph)
     if not running.stale:
-        _write_posed_cage(running, posed)
-        _remember(running, posed)
+        write_posed_cage(running, posed)
     _write_refit(running, settings.refit_armature)
 
 
-def _is_shown(posed: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+def is_seen(posed: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether anybody sees the posed cage, or has it in hand: a hidden one is not fitted."""
     if posed.data.is_editmode:
         return True
@@ -35,8 +34,15 @@ def _is_shown(posed: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
     return posed.visible_get(view_layer=depsgraph.view_layer)
 
 
-def _write_posed_cage(running: Running, posed: bpy.types.Object) -> None:
-    """Write C′ where it differs from what the mesh holds. What the artist holds in Edit Mode is left alone."""
+def write_posed_cage(running: Running, posed: bpy.types.Object) -> None:
+    """Write C′ where it differs from what the mesh holds. What the artist holds in Edit Mode is left alone, and an edit
+    mesh remembers.
+    """
+    _write_fitted(running, posed)
+    _remember(running, posed)
+
+
+def _write_fitted(running: Running, posed: bpy.types.Object) -> None:
     points, editing = running.session.posed_cage(), posed.data.is_editmode
     if running.posed is not None:
         tolerance = 1e-6 * running.session.size
@@ -59,8 +65,13 @@ def _remember(running: Running, posed: bpy.types.Object) -> None:
         running.memory = memory
 
 
+def is_refit(refit: bpy.types.Object | None, session: Session) -> bool:
+    """Whether the refit armature is there to be posed."""
+    return refit is not None and refit.mode != "EDIT" and len(refit.data.bones) == len(session.snapshot.heads)
+
+
 def _write_refit(running: Running, refit: bpy.types.Object | None) -> None:
-    if refit is None or refit.mode == "EDIT" or len(refit.data.bones) != len(running.session.snapshot.heads):
+    if not is_refit(refit, running.session):
         return
     if running.refit_bones is None:
         running.refit_bones = running.session.refit_bones(armature.read_rest_matrices(refit.data))

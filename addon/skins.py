@@ -84,16 +84,17 @@ class RestShape:
     complete: bool = True  # False: a part can only be read from the next evaluation on
 
 
-def read_plain(cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, known: Places) -> RestShape:
-    """`read` where no mask and no modifier before ours is at work on any skin."""
-    found = RestShape(session.offsets, session.masks)
-    for index, skin in enumerate(cage.cage_rig.skins):
-        if not skin.object.data.is_editmode:
-            at = place(cage, index, depsgraph, known)
-            rest = session.snapshot.skins[index].points
-            bound = None if at.still else np.array(skin.skin_to_rig, np.float64)
-            found.offsets[index] = _without_modifiers(skin.object, depsgraph, rest, at.matrix, bound)
-    return found
+def offset(
+    cage: bpy.types.Object,
+    index: int,
+    obj: bpy.types.Object,
+    at: Place,
+    session: Session,
+    depsgraph: bpy.types.Depsgraph,
+) -> Points | None:
+    """What moves the rest shape of skin `index`, which is `obj`, where no modifier before ours is at work on it."""
+    bound = None if at.still else np.array(cage.cage_rig.skins[index].skin_to_rig, np.float64)
+    return _without_modifiers(obj, depsgraph, session.snapshot.skins[index].points, at.matrix, bound)
 
 
 def read(cage: bpy.types.Object, session: Session, depsgraph: bpy.types.Depsgraph, *, readable: bool) -> RestShape:
@@ -182,21 +183,27 @@ def write(
     depsgraph: bpy.types.Depsgraph,
     written: Written,
     known: Places,
-    *,
-    plain: bool,
 ) -> None:
     """Feed posed points to those of the `skins` that this rig places and whose result changed since `written`.
 
-    A skin in Edit Mode waits. `plain`: nothing but cage and bones has moved since the last time.
+    A skin in Edit Mode waits.
     """
+    placed = []
     for index, obj in skins:
         if obj.data.is_editmode or obj.cage_rig.owner != cage:
             written.pop(index, None)
             continue
-        at = place(cage, index, depsgraph, known)
+        if not modifier.take_own(obj):
+            written.pop(index, None)
+        placed.append((index, obj, place(cage, index, depsgraph, known)))
+    feed(placed, session, written)
+
+
+def feed(placed: list[tuple[int, bpy.types.Object, Place]], session: Session, written: Written) -> None:
+    """Feed posed points to those of these skins whose result changed since `written`."""
+    for index, obj, at in placed:
         state = (session.revision, at.key)
-        was_own = plain or modifier.take_own(obj)
-        if was_own and written.get(index) == state and modifier.is_fed(obj):
+        if written.get(index) == state and modifier.is_fed(obj):
             continue
         points = session.posed_skin(index)
         if at.inverse is not None:

@@ -19,6 +19,7 @@ from . import (
     linked,
     migration,
     placing,
+    playing,
     posed_edits,
     registry,
     resting,
@@ -153,38 +154,47 @@ def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event)
 
 def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
     running = _running.get(cage.session_uid)
-    known = running is not None and event is Event.FRAME and running.seen is not None
-    known = known and running.seen == glance.seen(cage)
-    if not known and not _look_closely(cage, depsgraph, event):
+    if event is Event.FRAME and running is not None and running.seen is not None and running.seen == glance.seen(cage):
+        _play_on(cage, running, depsgraph)
+        return
+    if not _look_closely(cage, depsgraph, event):
         return
     source, bones = cage.evaluated_get(depsgraph), cage.cage_rig.armature.evaluated_get(depsgraph)
     if not (source.is_evaluated and bones.is_evaluated):
         return  # in no view of this depsgraph: nothing of it is shown
-    if running is None or (
-        not known and running.bind != binding.key(cage.cage_rig)
-    ):  # an undo brings back another bind
+    if running is None or running.bind != binding.key(cage.cage_rig):  # an undo brings back another bind
         running = _running[cage.session_uid] = Running.of(cage, binding.bound_anew(cage))
         event = Event.RESTORED
-    elif not known:
+    else:
         running.place(cage)
     if event is Event.RESTORED:
         running.written.clear()
         running.cage_wanted, running.memory = None, b""
-    if not known:
-        running.seen = None
-        if event is not Event.FRAME:
-            running.note = resting.look(cage, running, event, bones=depsgraph.id_type_updated("ARMATURE"))
+    running.seen = running.playback = None
+    if event is not Event.FRAME:
+        running.note = resting.look(cage, running, event, bones=depsgraph.id_type_updated("ARMATURE"))
     note = _advance(cage, running, depsgraph, event)
     showing.write(cage, running, depsgraph)
+    _note_stale(cage, running)
+    _resume(cage, note, running)
+    running.seen = glance.seen(cage) if glance.is_plain(cage) else None
+
+
+def _play_on(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> None:
+    """The next frame of a rig that is as it was."""
+    was_stale = running.stale
+    playing.play(cage, running, depsgraph, waits=_rendering or depsgraph.mode != "VIEWPORT")
+    if running.stale != was_stale:
+        _note_stale(cage, running)
+    if cage.cage_rig.message:
+        _resume(cage, "", running)
+
+
+def _note_stale(cage: bpy.types.Object, running: Running) -> None:
     if running.stale:
         _stale.add(registry.key_of(cage))
     else:
         _stale.discard(registry.key_of(cage))
-    if not known:
-        _resume(cage, note, running)
-        running.seen = glance.seen(cage) if glance.is_plain(cage) else None
-    elif cage.cage_rig.message:
-        _resume(cage, note, running)
 
 
 def _look_closely(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> bool:
@@ -224,10 +234,7 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
     """Read cage, posed cage and pose, and make the edit that they are. Returns a note for the panel."""
     session, settings = running.session, cage.cage_rig
     session.stand_on(_below(cage))
-    if running.seen is not None:
-        shape = skins.read_plain(cage, session, depsgraph, running.places)
-    else:
-        shape = skins.read(cage, session, depsgraph, readable=registry.key_of(cage) not in _again)
+    shape = skins.read(cage, session, depsgraph, readable=registry.key_of(cage) not in _again)
     session.offset_skins(shape.offsets)
     session.mask_skins(shape.masks)
     if not shape.complete:
@@ -240,9 +247,7 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
     choosing.use(cage, session, shown.method.lower(), later=later)
     session.keep_half_weights(settings.half_weights)
     rest = _read_rest_cage(cage, running, depsgraph)
-    if len(rest) != len(session.snapshot.cage):
-        raise SessionError(f"its modifiers make {len(rest)} vertices of {len(session.snapshot.cage)}; switch them off")
-    rest_changed = not _is_known(running, rest)
+    rest_changed = running.take_rest(rest)
     posed = _read_posed_cage(settings.posed_cage)
     if event is Event.RESTORED and settings.posed_cage.data.is_editmode:
         memory = positions.read_edit_layers(settings.posed_cage.data, binding.MEMORY)
@@ -252,10 +257,7 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
             return posed_edits.recall(cage, running, *memory)
     posed_changed = running.posed is None or not positions.same(posed, running.posed)
     is_edit = posed_changed and posed_edits.is_edit(cage, event, rest_changed)
-    if rest_changed:
-        running.cage, running.cage_wanted = rest, None
-    known = running.wanted()
-    session.play_posed(known, bones, pose, influence)
+    session.play_posed(running.wanted(), bones, pose, influence)
     before, running.posed = running.posed, posed
     if posed_changed and before is not None and placing.posed_has_stayed(cage, before, posed, depsgraph):
         is_edit, running.posed = False, None
@@ -274,13 +276,6 @@ def _below(cage: bpy.types.Object) -> Below | None:
     return binding.below(cage, _running[lower.session_uid].session)
 
 
-def _is_known(running: Running, rest: Points) -> bool:
-    """Whether the rest cage is the one of the last update, or the one that an edit of the posed cage wrote."""
-    if running.cage_wanted is not None:
-        return positions.close(rest, running.cage_wanted, 1e-6 * running.session.size)
-    return running.cage is not None and positions.same(rest, running.cage)
-
-
 def _read_rest_cage(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> Points:
     if cage.data.is_editmode:
         points = positions.read_edit_mesh(cage.data)
@@ -296,9 +291,7 @@ def _read_posed_cage(posed: bpy.types.Object) -> Points:
 def _read_pose(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> tuple[Bones, Matrix]:
     """The joints' bones at rest, and where they are in the evaluated pose (`#J by 4 by 4`)."""
     obj = cage.cage_rig.armature.evaluated_get(depsgraph)
-    if running.seen is None or running.bones is None:
-        running.bones = glance.read_bones(cage, obj, running.bones)
-    bones = running.bones
+    bones = running.bones = glance.read_bones(cage, obj, running.bones)
     posed = armature.read_pose_matrices(obj)
     if bones.pose_order is not None:
         posed = posed[bones.pose_order]

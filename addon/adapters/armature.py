@@ -64,6 +64,11 @@ def read_pose_matrices(armature_object: bpy.types.Object) -> Matrices:
     return _read_matrices(armature_object.pose.bones, "matrix")
 
 
+def read_pose_rows(armature_object: bpy.types.Object, rows: NDArray[np.float32]) -> None:
+    """The same into `#bones by 4 by 4` that is there, acting on rows as Blender has them."""
+    armature_object.pose.bones.foreach_get("matrix", rows.reshape(-1))
+
+
 def read_channels(armature_object: bpy.types.Object) -> Matrices:
     """Location, rotation (a quaternion) and scale of every pose bone, `#bones by 10`. Pass the evaluated object."""
     return np.array([[*bone.location, *_rotation(bone), *bone.scale] for bone in armature_object.pose.bones])
@@ -261,7 +266,12 @@ def add_helpers(obj: bpy.types.Object, context: bpy.types.Context, names: list[s
 
 def write_refit_pose(obj: bpy.types.Object, basis: Matrices) -> None:
     """Pose the parentless refit bones, each by `basis` in its own rest space, `#J by 4 by 4`."""
-    obj.pose.bones.foreach_set("matrix_basis", basis.transpose(0, 2, 1).astype(np.float32).ravel())
+    write_refit_rows(obj, basis.transpose(0, 2, 1).astype(np.float32, order="C"))
+
+
+def write_refit_rows(obj: bpy.types.Object, basis: NDArray[np.float32]) -> None:
+    """The same, acting on rows as Blender has them."""
+    obj.pose.bones.foreach_set("matrix_basis", basis.reshape(-1))
     obj.update_tag(refresh={"DATA"})
 
 

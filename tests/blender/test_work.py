@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
+from types import FrameType
 
 import bpy
 import numpy as np
@@ -86,6 +88,39 @@ def test_frames_read_no_inputs_of_the_modifier(bar: Rig, monkeypatch: pytest.Mon
     bar.armature.pose.bones[1].location.x = 0.1
     update()
     assert "Use Feed" in found
+
+
+def calls_of(act: Callable[[], None]) -> list[str]:
+    """Names of what Python calls meanwhile: functions, and as `core.` those of the core."""
+    found: list[str] = []
+
+    def note(frame: FrameType, event: str, called: object) -> None:
+        if event == "call":
+            found.append(frame.f_code.co_name)
+        elif event == "c_call":
+            core = type(getattr(called, "__self__", None)).__module__ == "cage_rig_core"
+            found.append(f"core.{called.__name__}" if core else called.__name__)
+
+    sys.setprofile(note)
+    try:
+        act()
+    finally:
+        sys.setprofile(None)
+    return found
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_a_frame_is_one_call_of_the_core_and_few_of_python(bar: Rig, hidden: bool) -> None:
+    key_pose(bar)
+    for obj in (bar.posed, bar.refit):
+        obj.hide_set(hidden)
+    bpy.context.scene.frame_set(2)
+    bpy.context.scene.frame_set(3)
+    before = shown(bar.skin).copy()
+    found = calls_of(lambda: bpy.context.scene.frame_set(4))
+    assert [name for name in found if name.startswith("core.")] == ["core.play"]
+    assert len(found) <= 100  # a microsecond each, more than the deformation of a small character
+    assert np.abs(shown(bar.skin) - before).max() > 1e-3
 
 
 def grow_before(rig: Rig) -> None:

@@ -145,6 +145,36 @@ def test_refit_bones_reach_their_children(live: object, snapshot: object) -> Non
     assert np.allclose(posed[0] @ [0, 1.0, 0, 1], [0, 0, 0, 1], atol=1e-6)
 
 
+def test_a_playback_shows_what_the_session_has_whoever_moved_it(
+    live: object, session: ModuleType, snapshot: object
+) -> None:
+    rest = np.tile(np.eye(4), (2, 1, 1))
+    rest[:, :3, 3] = snapshot.heads
+    bones, refit = session.bones(rest), live.refit_bones(rest)
+    other = session.Session(snapshot)
+    playback = session.Playback(live, bones, refit)
+    playback.cage[:] = snapshot.cage * np.float32(1.1)
+    for angle in (0.2, 0.7):
+        posed = bend(snapshot, angle) @ rest
+        playback.bones[:] = posed.transpose(0, 2, 1)
+        playback.play(0.5, fitted=True, again=False)
+        other.play_posed(playback.cage, bones, np.float32(posed), 0.5)
+        for k in range(2):
+            assert np.array_equal(live.posed_skin(k), other.posed_skin(k))
+        assert np.array_equal(playback.posed_cage, other.posed_cage())
+        assert np.array_equal(playback.refit_pose.transpose(0, 2, 1), np.float32(other.refit_pose(refit)))
+    before, work = live.revision, dict(live.rig.work)
+    playback.play(0.5, fitted=True, again=False)
+    assert (live.revision, dict(live.rig.work)) == (before, work)
+    offset = np.full_like(snapshot.skins[0].points, 0.25)
+    for each in (live, other):
+        each.offset_skins([offset, None])
+    playback.play(0.5, fitted=True, again=False)
+    assert np.array_equal(live.posed_skin(0), other.posed_skin(0))
+    live.play(snapshot.cage, bend(snapshot, 0.0), snapshot.heads)
+    assert np.abs(live.posed_skin(1) - snapshot.skins[1].points).max() < 1e-6
+
+
 def test_a_refusal_of_the_core_is_a_session_error(session: ModuleType, snapshot: object) -> None:
     broken = session.Snapshot(**{**vars(snapshot), "cage": snapshot.cage * np.float32(np.nan)})
     with pytest.raises(session.SessionError, match="cage"):
