@@ -53,11 +53,13 @@ def animated(vertices: int, cage: int) -> RigObjects:
 
 
 def play() -> Callable[[], None]:
-    """An act that goes to the next frame."""
-    frame = [1]
+    """An act that goes to the next frame, and from the last one to the second: in the first one the cage rests, and a
+    product that moves nothing is free.
+    """
+    frame = [2]
 
     def act() -> None:
-        frame[0] = frame[0] % 46 + 1
+        frame[0] = frame[0] + 1 if frame[0] < 46 else 2
         bpy.context.scene.frame_set(frame[0])
 
     return act
