@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import health, session
-from .adapters import armature, modifier, positions, stack
+from .adapters import armature, modifier, stack
 
 
 @dataclass(frozen=True)
@@ -47,16 +47,17 @@ def seen(cage: bpy.types.Object) -> tuple[object, ...] | None:
         settings.bind_id, settings.state, cage.users, bones.users, bones.session_uid, bones.mode, posed.users,
         posed.session_uid, len(bones.data.bones), cage.mode, posed.mode,
     ]  # fmt: skip
-    for obj in (cage, posed):
-        if not obj.data.is_editmode:
-            found += positions.topology(obj.data)
+    for mesh in (cage.data, posed.data):
+        if not mesh.is_editmode:
+            found += len(mesh.vertices), len(mesh.polygons), len(mesh.loops)
     for skin in settings.skins:
         obj = skin.object
         if obj is None:
             return None
-        found += (obj.users, obj.session_uid, obj.mode, obj.data.users, len(obj.data.vertices), skin.mask)
+        mesh = obj.data
+        found += obj.users, obj.session_uid, obj.mode, mesh.users, len(mesh.vertices), skin.mask
         for mod in obj.modifiers:
-            found += (mod.type, mod.show_viewport, mod.show_render)
+            found += mod.type, mod.show_viewport, mod.show_render
     return tuple(found)
 
 

@@ -93,10 +93,12 @@ def _read_bones(running: Running, playback: Playback, bones: bpy.types.Object) -
 
 def _read_cage(running: Running, playback: Playback, cage: bpy.types.Object, shown: bpy.types.Mesh) -> None:
     """The rest cage as it is shown; or that which an edit of the posed cage wrote, where it is this to rounding."""
-    if cage.data.is_editmode:
-        rest = positions.read_edit_mesh(cage.data)
-    else:
-        rest = positions.read_base(shown)
+    editing = cage.data.is_editmode
+    plain = not editing and running.cage_wanted is None and running.cage_to_rig is None
+    if plain and positions.read_into(shown, playback.cage):
+        running.cage = playback.cage
+        return
+    rest = positions.read_edit_mesh(cage.data) if editing else positions.read_base(shown)
     if running.cage_to_rig is not None:
         rest = positions.apply_matrix(running.cage_to_rig, rest)
     running.take_rest(rest)

@@ -50,15 +50,14 @@ def find(key: Key) -> bpy.types.Object | None:
 
 
 def _cages() -> list[bpy.types.Object]:
-    found = [find(key) for key in _found.names]
-    if all(_is_same(cage, uid) for cage, uid in zip(found, _found.names.values(), strict=True)):
-        return found
-    _look()  # renamed, replaced or gone
-    return [bpy.data.objects[key] for key in _found.names]
-
-
-def _is_same(cage: bpy.types.Object | None, uid: int) -> bool:
-    return cage is not None and cage.session_uid == uid and is_rig(cage)
+    found = []
+    for key, uid in _found.names.items():
+        cage = find(key)
+        if cage is None or cage.session_uid != uid or not is_rig(cage):  # renamed, replaced or gone
+            _look()
+            return [bpy.data.objects[key] for key in _found.names]
+        found.append(cage)
+    return found
 
 
 def is_rig(obj: bpy.types.Object) -> bool:

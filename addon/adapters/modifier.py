@@ -114,7 +114,7 @@ def write(skin: bpy.types.Object, points: Points) -> None:
     attribute = mesh.attributes.get(ATTRIBUTE)
     if attribute is None:
         attribute = mesh.attributes.new(ATTRIBUTE, "FLOAT_VECTOR", "POINT")
-    attribute.data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
+    attribute.data.foreach_set("vector", points.reshape(-1))
     mesh.update_tag()
 
 

@@ -17,6 +17,7 @@ NAME = "Cage Rig"
 OURS = "cage_rig."  # what the names of all our attributes of a skin begin with
 ATTRIBUTE = f"{OURS}posed"
 INPUT = f"{OURS}input"
+POSITION = "position"  # Blender's; to store it takes less time than to set it, which adds an offset
 INDEX = f"{OURS}index"  # kept beside the two: the proof that modifiers after ours reorder nothing
 
 SOCKETS = {
@@ -141,11 +142,9 @@ class _Builder:
     def by_attribute(self, geometry: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
         named = self.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
         self.link(self.given("Attribute"), named, "Name")
-        place = self.node("GeometryNodeSetPosition")
-        self.link(geometry, place, "Geometry")
-        self.link(named.outputs["Exists"], place, "Selection")
-        self.link(_socket(named.outputs, "Attribute"), place, "Position")
-        return place.outputs["Geometry"]
+        placed = self.stored(geometry, POSITION, "FLOAT_VECTOR", _socket(named.outputs, "Attribute"))
+        self.link(named.outputs["Exists"], placed.node, "Selection")
+        return placed
 
     def by_feed(
         self, geometry: bpy.types.NodeSocket, index: bpy.types.NodeSocket, position: bpy.types.NodeSocket
@@ -156,7 +155,4 @@ class _Builder:
         self.link(feed.outputs["Geometry"], sample, "Geometry")
         self.link(position, sample, "Value")
         self.link(index, sample, "Index")
-        place = self.node("GeometryNodeSetPosition")
-        self.link(geometry, place, "Geometry")
-        self.link(_socket(sample.outputs, "Value"), place, "Position")
-        return place.outputs["Geometry"]
+        return self.stored(geometry, POSITION, "FLOAT_VECTOR", _socket(sample.outputs, "Value"))

@@ -18,6 +18,14 @@ def read_base(mesh: bpy.types.Mesh) -> Points:
     return points
 
 
+def read_into(mesh: bpy.types.Mesh, points: Points) -> bool:
+    """`read_base` into points that are there; false where there are more or fewer. `points` lie in one piece."""
+    if len(mesh.vertices) != len(points):
+        return False
+    mesh.vertices.foreach_get("co", points.reshape(-1))
+    return True
+
+
 def read_some(mesh: bpy.types.Mesh, count: int) -> NDArray[np.float64]:
     """Base coordinates of so many vertices from the first to the last, `count by 3`. Not in Edit Mode."""
     last = len(mesh.vertices) - 1
@@ -74,8 +82,7 @@ def read_edit_layers(mesh: bpy.types.Mesh, names: tuple[str, ...]) -> list[Point
 
 def write_base(mesh: bpy.types.Mesh, points: Points) -> None:
     """Write base coordinates through the position attribute. Not in Edit Mode."""
-    flat = np.ascontiguousarray(points, np.float32).ravel()
-    mesh.attributes["position"].data.foreach_set("vector", flat)
+    mesh.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(points, np.float32).reshape(-1))
     mesh.update()
     mesh.update_tag()
 
