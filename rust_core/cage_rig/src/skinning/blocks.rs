@@ -5,7 +5,7 @@
 //! registers, so that what moves the vertices works on one vertex a lane. Everything in between stays in
 //! the first cache.
 
-use super::frame_weights::{FrameWeights, Quad};
+use super::frame_weights::{Entries, FrameWeights, Weights};
 use super::vectors::Three;
 use super::SkinningInput;
 use crate::simd::{Kernel, Lanes};
@@ -80,36 +80,36 @@ fn blend_block<L: Lanes, const GROUPS: usize, M: Mover<GROUPS>>(
     first: usize,
     rows: &mut [Row<GROUPS>],
 ) {
-    match weights.single() {
-        Some(quads) => {
-            for (row, quad) in rows.iter_mut().zip(&quads[first..]) {
-                blend::<_, GROUPS, M>(lanes, table, std::slice::from_ref(quad), row);
-            }
+    let (entries, parts) = weights.quads(M::PAIRS);
+    if weights.several(first).is_none() {
+        let quads = entries[first..].chunks_exact(1).zip(parts[first..].chunks_exact(1));
+        for (row, (entries, parts)) in rows.iter_mut().zip(quads) {
+            blend(lanes, table, entries, parts, row);
         }
-        None => {
-            for (i, row) in rows.iter_mut().enumerate() {
-                blend::<_, GROUPS, M>(lanes, table, weights.several(first + i), row);
-            }
-        }
+        return;
+    }
+    for (i, row) in rows.iter_mut().enumerate() {
+        let of = weights.several(first + i).unwrap_or_default();
+        blend(lanes, table, &entries[of.clone()], &parts[of], row);
     }
 }
 
-/// Writes the sum of the rows that `quads` name, by their weights.
+/// Writes the sum of the rows that the `entries` of quads name, by their weights.
 #[inline(always)]
-fn blend<L: Lanes, const GROUPS: usize, M: Mover<GROUPS>>(
+fn blend<L: Lanes, const GROUPS: usize>(
     lanes: L,
     table: &[Row<GROUPS>],
-    quads: &[Quad],
+    entries: &[Entries],
+    parts: &[Weights],
     row: &mut Row<GROUPS>,
 ) {
     // A row is up to eight vectors; those beyond it are never made.
     let vectors = GROUPS * 4 / L::F32_LANES;
     let mut sums = [lanes.splat_f32s(0.0); 8];
-    for quad in quads {
-        let entries = if M::PAIRS { &quad.pairs } else { &quad.joints };
-        for (entry, weight) in entries.iter().zip(quad.weights) {
+    for (entries, parts) in entries.iter().zip(parts) {
+        for (entry, weight) in entries.iter().zip(parts) {
             let numbers = L::as_simd_f32s(table[*entry as usize].as_flattened()).0;
-            let weight = lanes.splat_f32s(weight);
+            let weight = lanes.splat_f32s(*weight);
             for v in 0..vectors {
                 sums[v] = lanes.fused(weight, numbers[v], sums[v]);
             }

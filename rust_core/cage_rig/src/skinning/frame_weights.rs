@@ -6,27 +6,27 @@
 
 use crate::weights::SkinWeights;
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Weights that lack less than this to 1 lack nothing but rounding.
 const COMPLETE: f64 = 1e-6;
 /// Influences of a quad.
 pub(super) const QUAD: usize = 4;
 
-/// Four influences of one vertex.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Quad {
-    /// Bones.
-    pub(super) joints: [u32; QUAD],
-    /// Entries of [`FrameWeights::pairs`].
-    pub(super) pairs: [u32; QUAD],
-    pub(super) weights: [f32; QUAD],
-}
+/// Bones or pairs of bones of a quad.
+pub(super) type Entries = [u32; QUAD];
+/// Weights of a quad.
+pub(super) type Weights = [f32; QUAD];
 
 /// `#M by #J`.
 #[derive(Debug, Clone)]
 pub struct FrameWeights {
     vertices: usize,
-    quads: Vec<Quad>,
+    /// Of every quad its bones, the same as entries of `pairs`, and its weights; apart, because a method reads
+    /// either bones or pairs.
+    joints: Vec<Entries>,
+    paired: Vec<Entries>,
+    weights: Vec<Weights>,
     /// Where the quads of each vertex start, and the end; empty where every vertex has one.
     starts: Vec<u32>,
     pairs: Vec<[u32; 2]>,
@@ -36,7 +36,14 @@ impl FrameWeights {
     /// Packs `weights`.
     pub fn new(weights: &SkinWeights) -> Self {
         let still = weights.joints() as u32;
-        let (mut quads, mut starts, mut pairs) = (Vec::with_capacity(weights.len()), vec![0], Vec::new());
+        let mut packed = Self {
+            vertices: weights.len(),
+            joints: Vec::with_capacity(weights.len()),
+            paired: Vec::with_capacity(weights.len()),
+            weights: Vec::with_capacity(weights.len()),
+            starts: vec![0],
+            pairs: Vec::new(),
+        };
         let mut known = HashMap::new();
         for vertex in 0..weights.len() {
             let mut row = weights.row(vertex).to_vec();
@@ -47,23 +54,25 @@ impl FrameWeights {
                 row.push((still, lack));
             }
             for influences in row.chunks(QUAD) {
-                let mut quad = Quad { joints: [pivot; QUAD], ..Quad::default() };
+                let (mut joints, mut paired, mut parts) = ([pivot; QUAD], [0; QUAD], [0.0; QUAD]);
                 let influences = influences.iter().map(|&(joint, weight)| (joint, weight as f32));
                 for (k, (joint, weight)) in influences.chain([(pivot, 0.0); QUAD]).take(QUAD).enumerate() {
-                    (quad.joints[k], quad.weights[k]) = (joint, weight);
-                    quad.pairs[k] = *known.entry([pivot, joint]).or_insert_with(|| {
-                        pairs.push([pivot, joint]);
-                        pairs.len() as u32 - 1
+                    (joints[k], parts[k]) = (joint, weight);
+                    paired[k] = *known.entry([pivot, joint]).or_insert_with(|| {
+                        packed.pairs.push([pivot, joint]);
+                        packed.pairs.len() as u32 - 1
                     });
                 }
-                quads.push(quad);
+                packed.joints.push(joints);
+                packed.paired.push(paired);
+                packed.weights.push(parts);
             }
-            starts.push(quads.len() as u32);
+            packed.starts.push(packed.weights.len() as u32);
         }
-        if quads.len() == weights.len() {
-            starts.clear();
+        if packed.weights.len() == weights.len() {
+            packed.starts.clear();
         }
-        Self { vertices: weights.len(), quads, starts, pairs }
+        packed
     }
 
     /// Number of vertices.
@@ -81,15 +90,16 @@ impl FrameWeights {
         &self.pairs
     }
 
-    /// All quads, for vertices that have one each.
+    /// Of all quads the pairs, or the bones, and the weights.
     #[inline(always)]
-    pub(super) fn single(&self) -> Option<&[Quad]> {
-        self.starts.is_empty().then_some(&self.quads)
+    pub(super) fn quads(&self, paired: bool) -> (&[Entries], &[Weights]) {
+        (if paired { &self.paired } else { &self.joints }, &self.weights)
     }
 
-    /// The quads of `vertex` where [`Self::single`] is none.
+    /// Where the quads of `vertex` are; none where every vertex has the one of its index.
     #[inline(always)]
-    pub(super) fn several(&self, vertex: usize) -> &[Quad] {
-        &self.quads[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    pub(super) fn several(&self, vertex: usize) -> Option<Range<usize>> {
+        let (start, end) = (self.starts.get(vertex)?, self.starts.get(vertex + 1)?);
+        Some(*start as usize..*end as usize)
     }
 }
