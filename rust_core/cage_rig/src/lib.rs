@@ -29,6 +29,7 @@ pub mod simd;
 mod skeleton;
 pub mod skinning;
 pub mod sync;
+mod threads;
 mod weights;
 
 #[cfg(test)]

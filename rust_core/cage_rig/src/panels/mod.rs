@@ -15,6 +15,7 @@ mod tests;
 use crate::progress::{Cancelled, Part};
 use crate::rows::Rows;
 use crate::simd::{Kernel, Lanes, Path, Vector};
+use crate::threads;
 pub(crate) use apart::Apart;
 use halves::{Half, HalfMoves, Pair};
 use rayon::prelude::*;
@@ -22,10 +23,10 @@ use singles::{Single, SingleMoves};
 
 /// Rows of a panel.
 const PANEL: usize = 32;
-/// Below this many numbers one thread is faster than two.
-const PARALLEL_FROM: usize = 1 << 20;
+/// Below this many numbers one thread is faster than two; each further one needs as many.
+const PARALLEL_FROM: usize = 1 << 18;
 /// Panels that one thread takes at a time.
-const SHARE: usize = 64;
+const SHARE: usize = 16;
 /// Frames of one walk.
 pub(crate) const FRAMES: usize = 4;
 
@@ -151,11 +152,13 @@ impl Panels {
     /// Writes `from` + mask · (matrix · `steps`) + offsets, `#rows by 3`.
     pub(crate) fn write(&self, product: &Product, steps: &mut Steps, out: &mut [[f32; 3]]) {
         let steps = self.rounded(steps);
-        if out.len() * steps.moved.len() < PARALLEL_FROM {
+        let numbers = out.len() * steps.moved.len();
+        if numbers < PARALLEL_FROM {
             product.path.run(Write { panels: self, product, first: 0, steps, out: [out] });
             return;
         }
-        out.par_chunks_mut(SHARE * PANEL).enumerate().for_each(|(share, out)| {
+        let shares = out.chunks_mut(SHARE * PANEL).enumerate();
+        threads::each(shares, numbers / PARALLEL_FROM, |(share, out)| {
             let first = share * SHARE * PANEL;
             product.path.run(Write { panels: self, product, first, steps, out: [out] });
         });

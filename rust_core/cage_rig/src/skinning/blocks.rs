@@ -9,14 +9,14 @@ use super::frame_weights::{Entries, FrameWeights, Weights};
 use super::vectors::Three;
 use super::SkinningInput;
 use crate::simd::{Kernel, Lanes};
-use rayon::prelude::*;
+use crate::threads;
 
 /// Vertices of a block.
 const BLOCK: usize = 32;
-/// Below this many vertices one thread is faster than two.
+/// Below this many vertices one thread is faster than two; each further one needs as many.
 const PARALLEL_FROM: usize = 8192;
 /// Vertices that one thread takes at a time.
-const SHARE: usize = 2048;
+const SHARE: usize = 1024;
 
 /// A row of numbers: groups of four.
 pub(super) type Row<const GROUPS: usize> = [[f32; 4]; GROUPS];
@@ -44,10 +44,11 @@ pub(super) fn each_vertex<const GROUPS: usize, M: Mover<GROUPS>>(
             Pass::<GROUPS, M> { table, input, first: index * SHARE, out, mover: std::marker::PhantomData };
         input.path.run(pass);
     };
-    if posed.len() < PARALLEL_FROM {
+    let vertices = posed.len();
+    if vertices < PARALLEL_FROM {
         posed.chunks_mut(SHARE).enumerate().for_each(share);
     } else {
-        posed.par_chunks_mut(SHARE).enumerate().for_each(share);
+        threads::each(posed.chunks_mut(SHARE).enumerate(), vertices / PARALLEL_FROM, share);
     }
 }
 
