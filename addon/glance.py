@@ -2,7 +2,8 @@
 """What a rig was found to be when it was last looked at closely, and how to see at a glance that it still is.
 
 Looking closely (`health`, `layers`, modifiers, names of bones) takes longer than a frame of a small character. It is
-done at every edit; a frame alone changes none of it, but scripts may have, so what they could have changed is compared.
+done at every edit; a frame alone changes none of it, but scripts may have, so what they could have changed is compared
+(bones apart: a frame tells itself that an armature has changed).
 """
 
 from __future__ import annotations
@@ -45,11 +46,11 @@ def seen(cage: bpy.types.Object) -> tuple[object, ...] | None:
         return None
     found = [
         settings.bind_id, settings.state, cage.users, bones.users, bones.session_uid, bones.mode, posed.users,
-        posed.session_uid, len(bones.data.bones), cage.mode, posed.mode,
+        posed.session_uid, cage.mode, posed.mode,
     ]  # fmt: skip
     for mesh in (cage.data, posed.data):
         if not mesh.is_editmode:
-            found += len(mesh.vertices), len(mesh.polygons), len(mesh.loops)
+            found += len(mesh.vertices), len(mesh.loops)
     for skin in settings.skins:
         obj = skin.object
         if obj is None:
