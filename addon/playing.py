@@ -42,11 +42,11 @@ def play(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgrap
     _read_cage(running, playback, cage, shown.data)
     posed = settings.posed_cage
     fitted = showing.is_seen(posed, depsgraph)
-    playback.play(look.influence, fitted=fitted, again=fitted and running.stale)
+    made = playback.play(look.influence, fitted=fitted, again=fitted and running.stale)
     running.stale = not fitted
     skins.feed(live, session, running.written)
     if fitted:
-        _write_posed_cage(running, playback, posed)
+        _write_posed_cage(running, playback, posed, made=made)
     state = (session.revision, b"")
     if playback.refit_pose is not None and running.written.get(-1) != state:
         if showing.is_refit(settings.refit_armature, session):
@@ -105,16 +105,16 @@ def _read_cage(running: Running, playback: Playback, cage: bpy.types.Object, sho
     playback.cage[:] = running.wanted()
 
 
-def _write_posed_cage(running: Running, playback: Playback, posed: bpy.types.Object) -> None:
-    """C′ where it differs from what the mesh holds, which is read where the rig has written the same already."""
-    mesh = posed.data
+def _write_posed_cage(running: Running, playback: Playback, posed: bpy.types.Object, *, made: bool) -> None:
+    """C′ where it was made anew, or differs from what the mesh holds."""
+    mesh, fitted = posed.data, playback.posed_cage
     if mesh.is_editmode:
         running.posed = positions.read_edit_mesh(mesh)
         showing.write_posed_cage(running, posed)
         return
-    fitted = playback.posed_cage
-    if running.posed is not None and positions.same(fitted, running.posed):
+    if not made:
         running.posed = positions.read_base(mesh)
-    if running.posed is None or not positions.same(fitted, running.posed):
+    if made or not positions.same(fitted, running.posed):
         positions.write_base(mesh, fitted)
-        running.posed = fitted.copy()
+        running.posed = playback.written_cage
+        running.posed[:] = fitted

@@ -357,6 +357,7 @@ class Playback:
         self.cage = np.empty_like(cage)  # rest cage, `#C by 3` in rig space, filled in
         self.bones = np.empty((count, 4, 4), np.float32)  # posed, acting on rows as Blender has them, filled in
         self.posed_cage = np.empty_like(cage)  # `#C by 3`, shown
+        self.written_cage = np.empty_like(cage)  # of those the last one that was written
         self.refit_pose = None if refit is None else np.empty((count, 4, 4), np.float32)  # acting on rows, shown
         self._session, self._filled = session, False
         self._core = cage_rig_core.Playback(
@@ -371,15 +372,17 @@ class Playback:
         )
 
     @_door
-    def play(self, influence: float, *, fitted: bool, again: bool) -> None:
+    def play(self, influence: float, *, fitted: bool, again: bool) -> bool:
         """Play what was filled in. The posed cage is made where it is `fitted`; nothing is made where nothing is new,
-        but what is to be shown `again`.
+        but what is to be shown `again`. Returns whether anything was made.
         """
         session = self._session
         again |= session.shown != session.revision or not self._filled
         session.influence = influence
-        session.revision += self._core.play(influence, fitted=fitted, again=again)
+        new = self._core.play(influence, fitted=fitted, again=again)
+        session.revision += new
         session.shown, self._filled = session.revision, True
+        return new or again
 
 
 class BindJob:
