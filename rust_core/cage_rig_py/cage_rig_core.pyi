@@ -42,6 +42,7 @@ __all__ = [
     "check_cage",
     "coordinate_kinds",
     "extract_skeleton",
+    "fit_cage",
     "generate_cage",
     "mean_value_coordinates",
     "skinning_methods",
@@ -370,6 +371,17 @@ def cage_sections(
     bending_nodes: ArrayLike | None = None,
     options: CagingOptions | None = None,
 ) -> list[Section]: ...
+def fit_cage(
+    vertices: ArrayLike,  # (#V, 3)
+    faces: Faces,  # closed
+    nodes: ArrayLike,  # (#N, 3), of the skeleton
+    edges: ArrayLike,  # (#E, 2)
+    cage_vertices: ArrayLike,  # (#C, 3), about where they are to be
+    cage_faces: Faces,  # closed; taken over, index for index
+    *,
+    options: CagingOptions | None = None,
+    progress: Callable[[str, float], object] | None = None,  # stage, part; a false answer but None cancels
+) -> tuple[Doubles, NDArray[np.int64] | tuple[NDArray[np.int64], NDArray[np.int64]], CagingReport]: ...
 def extract_skeleton(vertices: ArrayLike, faces: Faces) -> tuple[Doubles, NDArray[np.int64]]: ...  # nodes, edges
 
 @final
@@ -421,6 +433,7 @@ class CageGenerator:
         like: LikeCage | None = None,
         arrangement: ArrayLike | None = None,  # of the report of an earlier cage that was like another one
     ) -> CagingJob: ...
+    def fit(self, cage_vertices: ArrayLike, cage_faces: Faces) -> CagingJob: ...  # as fit_cage
     @property
     def arcs(self) -> list[Arc]: ...  # the skeleton as it is used: clipped, recentred, pruned
     @property

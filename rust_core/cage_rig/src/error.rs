@@ -253,6 +253,14 @@ pub enum CagingError {
     Unlike { section: usize },
     #[error("the other cage has {wanted} cross sections from number {section} on, with these nodes there are {found}")]
     OtherNodes { section: usize, wanted: usize, found: usize },
+    #[error("the rough cage can't be fitted: {0}")]
+    Rough(#[from] CageError),
+    #[error("the rough cage crosses itself at vertex {vertex}, near {}; pull its faces apart there", at(.place))]
+    RoughCrosses { vertex: usize, place: Point },
+    #[error("the rough cage leaves out the middle of the skin near skeleton node {node} at {}; bring its faces around it", at(.place))]
+    RoughMisses { node: usize, place: Point },
+    #[error("the rough cage can't be drawn around the skin near skeleton node {node} at {}: it needs more faces there", at(.place))]
+    RoughStuck { node: usize, place: Point },
     #[error("option {name} is {value}; it must be between {low} and {high}")]
     Option { name: &'static str, value: f64, low: f64, high: f64 },
     #[error(transparent)]
@@ -282,9 +290,12 @@ impl CagingError {
             Self::NoSection { node, place }
             | Self::NoStart { node, place }
             | Self::Stuck { node, place }
+            | Self::RoughMisses { node, place }
+            | Self::RoughStuck { node, place }
             | Self::NotValid { node, place, .. } => (Some(*node), Some(*place)),
             Self::OpenSkin { place, .. }
             | Self::NonManifoldSkin { place, .. }
+            | Self::RoughCrosses { place, .. }
             | Self::NotOrientable { place } => (None, Some(*place)),
             Self::NodeNotFinite { node } => (Some(*node), None),
             _ => (None, None),

@@ -4,7 +4,7 @@ use crate::arrays;
 use crate::errors::{cancelled, CageRigError, OrRaise};
 use crate::jobs::Job;
 use cage_rig::caging::{
-    CageReport, CagingOptions, Earlier, GeneratedCage, Generator, NodeKind, Placement, Repairs,
+    CageReport, CagingOptions, Earlier, GeneratedCage, Generator, NodeKind, Placement, Repairs, RoughCage,
     SectionReport, Template,
 };
 use cage_rig::{CagingError, Error, Point, Polygons, Progress};
@@ -72,6 +72,26 @@ impl CagingJob {
             })
         };
         Ok(Self(Job::start(work, Arc::new)?))
+    }
+
+    /// Waits for the result, telling a function of Python how far it is, which may cancel it.
+    fn watched<'py>(
+        &self,
+        py: Python<'py>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let mut told = None;
+        while !self.wait(py, progress.map(|_| TELLING))? {
+            let Some(call) = progress else { continue };
+            let news = (self.stage(), self.progress());
+            if !news.0.is_empty() && told.replace(news) != Some(news) {
+                let answer = call.call1(news)?;
+                if !answer.is_none() && !answer.is_truthy()? {
+                    return Err(cancelled(py));
+                }
+            }
+        }
+        self.result(py)
     }
 }
 
@@ -204,6 +224,12 @@ impl CageGenerator {
         repairs_dict(py, &self.0.repairs())
     }
 
+    /// Begins to fit a rough cage, as fit_cage, in a thread of its own.
+    fn fit(&self, cage_vertices: &Bound<'_, PyAny>, cage_faces: &Bound<'_, PyAny>) -> PyResult<CagingJob> {
+        let (generator, rough) = (Arc::clone(&self.0), rough_cage(cage_vertices, cage_faces)?);
+        CagingJob::start(move |progress| generator.fit(&rough, &progress.whole()))
+    }
+
     /// Begins the cage in a thread of its own. `earlier`: bending nodes (or None), vertices (#C, 3) and
     /// faces of a cage of the same skin, skeleton and options; what it has around nodes that are still
     /// there stays. `like` as in generate_cage; `arrangement`: of the report of an earlier cage that was like
@@ -235,6 +261,33 @@ impl CageGenerator {
     }
 }
 
+/// Makes a rough cage (cage_vertices (#C, 3), cage_faces) enclose a closed skin without crossing it, and draws it
+/// tight: its vertices, its faces, index for index, and a report. What else is as in generate_cage.
+#[pyfunction]
+#[pyo3(signature = (vertices, faces, nodes, edges, cage_vertices, cage_faces, *, options=None, progress=None))]
+#[allow(clippy::too_many_arguments)] // the names are keywords in Python
+fn fit_cage<'py>(
+    py: Python<'py>,
+    vertices: &Bound<'py, PyAny>,
+    faces: &Bound<'py, PyAny>,
+    nodes: &Bound<'py, PyAny>,
+    edges: &Bound<'py, PyAny>,
+    cage_vertices: &Bound<'py, PyAny>,
+    cage_faces: &Bound<'py, PyAny>,
+    options: Option<&Bound<'py, PyDict>>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let input = Input::read([vertices, faces], [nodes, edges], options)?;
+    let rough = rough_cage(cage_vertices, cage_faces)?;
+    let job = CagingJob::start(move |progress| input.generator()?.fit(&rough, &progress.whole()))?;
+    job.watched(py, progress)
+}
+
+fn rough_cage(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> PyResult<RoughCage> {
+    let vertices = arrays::points(vertices, "cage_vertices", ("#C", None))?;
+    Ok(RoughCage { vertices, faces: arrays::polygons(faces, "cage_faces")? })
+}
+
 /// Builds a cage around a closed skin (vertices (#V, 3), faces) from its skeleton (nodes (#N, 3),
 /// edges (#E, 2)). Returns its vertices, its faces (corner indices, face sizes), and a report. `like`:
 /// vertices (#C, 3), faces, and vertices of a cross section of a generated cage whose faces it takes over,
@@ -254,18 +307,7 @@ fn generate_cage<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyTuple>> {
     let job = CagingJob::new(vertices, faces, nodes, edges, bending_nodes, options, like)?;
-    let mut told = None;
-    while !job.wait(py, progress.map(|_| TELLING))? {
-        let Some(call) = progress else { continue };
-        let news = (job.stage(), job.progress());
-        if !news.0.is_empty() && told.replace(news) != Some(news) {
-            let answer = call.call1(news)?;
-            if !answer.is_none() && !answer.is_truthy()? {
-                return Err(cancelled(py));
-            }
-        }
-    }
-    job.result(py)
+    job.watched(py, progress)
 }
 
 fn cage_tuple<'py>(py: Python<'py>, found: &GeneratedCage) -> PyResult<Bound<'py, PyTuple>> {
@@ -408,5 +450,6 @@ pub(crate) fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<CageGenerator>()?;
     module.add_function(wrap_pyfunction!(extract_skeleton, module)?)?;
     module.add_function(wrap_pyfunction!(generate_cage, module)?)?;
+    module.add_function(wrap_pyfunction!(fit_cage, module)?)?;
     module.add_function(wrap_pyfunction!(cage_sections, module)?)
 }

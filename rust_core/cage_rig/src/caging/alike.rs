@@ -273,7 +273,7 @@ impl Generator {
     }
 
     /// What is wrong with the template's faces between these vertices, its quads split in any way.
-    fn fault_of(&self, pattern: &Pattern, vertices: &[Point]) -> Option<Fault> {
+    pub(super) fn fault_of(&self, pattern: &Pattern, vertices: &[Point]) -> Option<Fault> {
         let skin = (&self.skin.original[..], &self.skin.triangles[..]);
         let mut possible = pattern.triangles();
         if let Some(fault) = verify::fault(vertices, &possible, skin.0, skin.1) {

@@ -216,8 +216,13 @@ pub(crate) fn newton_step(shape: &Shape, points: &Points, contacts: &[Contact], 
     step
 }
 
-/// Where the sections that close nothing are along their limbs, with these corners.
+/// Where the sections that close nothing are along their limbs, with these corners. None of a cage whose
+/// vertices are not those of its sections, one after the other.
 pub(crate) fn stations(scaffold: &Scaffold, corners: &[Point]) -> Vec<Station> {
+    let of_section = scaffold.owner.iter().filter(|node| **node == 0).count().max(1);
+    if scaffold.owner.iter().enumerate().any(|(v, node)| *node != v / of_section) {
+        return Vec::new();
+    }
     let count = scaffold.owner.last().map_or(0, |last| last + 1);
     let mut vertices = vec![Vec::new(); count];
     for (v, node) in scaffold.owner.iter().enumerate() {

@@ -16,6 +16,7 @@ mod energy;
 mod extraction;
 pub(crate) mod field;
 mod finishing;
+mod fitting;
 mod inflation;
 mod lineage;
 mod obstacle;
@@ -38,6 +39,7 @@ mod verify;
 
 pub use control_nodes::{NodeKind, Placement};
 pub use extraction::{extract_skeleton, ExtractedSkeleton};
+pub use fitting::RoughCage;
 pub use inflation::InflationOptions;
 pub use regrowth::Earlier;
 pub use report::{ArcReport, CageReport, Laps, SectionReport};

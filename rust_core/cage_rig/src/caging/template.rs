@@ -142,6 +142,11 @@ impl Pattern {
         Some(Self { count, vertices, faces, chains, branches })
     }
 
+    /// Faces without sections.
+    pub(crate) fn loose(vertices: Vec<Point>, faces: Vec<Vec<u32>>) -> Self {
+        Self { count: 1, vertices, faces, chains: Vec::new(), branches: Vec::new() }
+    }
+
     pub(crate) fn sections(&self) -> usize {
         self.vertices.len() / self.count
     }
@@ -162,6 +167,11 @@ impl Pattern {
         self.faces.iter().flat_map(fan).collect()
     }
 
+    pub(crate) fn polygons(&self) -> Polygons {
+        let corners = self.faces.iter().flatten().map(|v| i64::from(*v)).collect();
+        Polygons { corners, sizes: self.faces.iter().map(Vec::len).collect() }
+    }
+
     pub(crate) fn quads(&self) -> Vec<[u32; 4]> {
         self.faces.iter().filter_map(|face| face[..].try_into().ok()).collect()
     }
@@ -180,12 +190,22 @@ impl Pattern {
         }
     }
 
-    /// For each vertex its mirror image; `None` where one has none.
-    pub(crate) fn mirror(&self) -> Option<Vec<u32>> {
-        let (low, high) = self
-            .vertices
+    /// From left to right.
+    fn span(&self) -> (f64, f64) {
+        self.vertices
             .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.x), high.max(p.x)));
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.x), high.max(p.x)))
+    }
+
+    /// Whether its middle is about on the plane of symmetry.
+    pub(crate) fn is_in_middle(&self) -> bool {
+        let (low, high) = self.span();
+        (low + high).abs() < 0.02
+    }
+
+    /// For each vertex its mirror image, about its own middle; `None` where one has none.
+    pub(crate) fn mirror(&self) -> Option<Vec<u32>> {
+        let (low, high) = self.span();
         let partner = |p: &Point| Point::new(low + high - p.x, p.y, p.z);
         let of_point = |p: &Point| {
             let apart = |v: &usize| (self.vertices[*v] - partner(p)).norm();

@@ -96,53 +96,76 @@ pub(crate) fn scaffold(
         polygons: Vec::new(),
     };
     let ring = |node: usize| -> Vec<u32> { (0..count).map(|k| (node * count + k) as u32).collect() };
-    let mut at_junction: Vec<Vec<(usize, bool)>> = vec![Vec::new(); skeleton.junctions.len()];
-    for (at, arc) in skeleton.arcs.iter().enumerate() {
-        let chain: Vec<usize> = (0..nodes.len()).filter(|n| nodes[*n].arc == at).collect();
-        for w in chain.windows(2) {
-            built.join(&ring(w[0]), &ring(w[1]));
-            built.axis.edges.push((w[0], w[1]));
-        }
-        for (side, node) in [(0, chain.first()), (1, chain.last())] {
-            let Some(&node) = node else { continue };
-            if nodes[node].kind == NodeKind::Leaf
-                && (side == 0 || chain.len() > 1)
-                && is_leaf_end(skeleton, at, side)
-            {
-                let mut cap = ring(node);
-                if side == 0 {
-                    cap.reverse();
-                }
-                built.polygons.push(cap);
-            } else {
-                at_junction[arc.ends[side]].push((node, side == 0));
-            }
-        }
-        // A leaf on its own on its arc closes one side and opens to the branching node on the other.
-        if let [node] = chain[..] {
-            for side in 0..2 {
-                if nodes[node].kind == NodeKind::Leaf && side == 1 && is_leaf_end(skeleton, at, 1) {
-                    at_junction[arc.ends[1]].retain(|(n, _)| *n != node);
-                    built.polygons.push(ring(node));
-                }
-            }
-        }
+    let course = Course::new(skeleton, nodes);
+    for &(a, b) in &course.strips {
+        built.join(&ring(a), &ring(b));
     }
-    for (junction, members) in at_junction.iter().enumerate() {
+    built.axis.edges.extend(&course.strips);
+    for &(node, away) in &course.caps {
+        let mut cap = ring(node);
+        if away {
+            cap.reverse();
+        }
+        built.polygons.push(cap);
+    }
+    for (junction, members) in course.branches.iter().enumerate() {
         if members.len() >= 2 {
             let found = built.branch(&skeleton.junctions[junction].point, members, &ring);
-            let center = found.ok_or(junction)?;
-            let at = built.axis.points.len();
-            built.axis.points.push(center);
-            built.axis.edges.extend(members.iter().map(|(node, _)| (*node, at)));
+            built.axis.meet(members, found.ok_or(junction)?);
         }
     }
     built.pull_leaves(nodes);
     Ok(built)
 }
 
-fn is_leaf_end(skeleton: &CurveSkeleton, arc: usize, side: usize) -> bool {
-    skeleton.junctions[skeleton.arcs[arc].ends[side]].degree == 1
+/// How control nodes follow one another.
+struct Course {
+    /// Neighbours on an arc.
+    strips: Vec<(usize, usize)>,
+    /// Leaves, and whether their arc leads away from its tip.
+    caps: Vec<(usize, bool)>,
+    /// For each junction what meets there, and whether its arc leads away from it.
+    branches: Vec<Vec<(usize, bool)>>,
+}
+
+impl Course {
+    fn new(skeleton: &CurveSkeleton, nodes: &[ControlNode]) -> Self {
+        let branches = vec![Vec::new(); skeleton.junctions.len()];
+        let mut found = Self { strips: Vec::new(), caps: Vec::new(), branches };
+        for (at, arc) in skeleton.arcs.iter().enumerate() {
+            let chain: Vec<usize> = (0..nodes.len()).filter(|n| nodes[*n].arc == at).collect();
+            found.strips.extend(chain.windows(2).map(|w| (w[0], w[1])));
+            for (end, away, node) in [(arc.ends[0], true, chain.first()), (arc.ends[1], false, chain.last())]
+            {
+                let Some(&node) = node else { continue };
+                let closes = nodes[node].kind == NodeKind::Leaf && skeleton.junctions[end].degree == 1;
+                let place = if closes { &mut found.caps } else { &mut found.branches[end] };
+                place.push((node, away));
+            }
+        }
+        found
+    }
+}
+
+impl Axis {
+    /// Through the centers of sections and the branching nodes themselves.
+    pub(crate) fn along(skeleton: &CurveSkeleton, nodes: &[ControlNode], centers: &[Point]) -> Self {
+        let course = Course::new(skeleton, nodes);
+        let mut axis = Self { points: centers.to_vec(), edges: course.strips };
+        for (junction, members) in skeleton.junctions.iter().zip(&course.branches) {
+            if members.len() >= 2 {
+                axis.meet(members, junction.point);
+            }
+        }
+        axis
+    }
+
+    /// Joins the ends of limbs.
+    fn meet(&mut self, members: &[(usize, bool)], center: Point) {
+        let at = self.points.len();
+        self.points.push(center);
+        self.edges.extend(members.iter().map(|(node, _)| (*node, at)));
+    }
 }
 
 impl Scaffold {
