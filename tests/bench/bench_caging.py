@@ -80,13 +80,18 @@ def skin_of(case: Case) -> Skin | None:
     return character(path)
 
 
-def example(path: Path) -> Skin:
-    """A mesh in OFF, with the skeleton that is found in it."""
+def mesh(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles in OFF."""
     words = path.read_text().split()
     count, faces = int(words[1]), int(words[2])
     numbers = words[4:]
     points = np.array(numbers[: 3 * count], float).reshape(-1, 3)
-    triangles = np.array(numbers[3 * count : 3 * count + 4 * faces], int).reshape(-1, 4)[:, 1:]
+    return points, np.array(numbers[3 * count : 3 * count + 4 * faces], int).reshape(-1, 4)[:, 1:]
+
+
+def example(path: Path) -> Skin:
+    """A mesh, with the skeleton that is found in it."""
+    points, triangles = mesh(path)
     return points, triangles, *core.extract_skeleton(points, triangles)
 
 
@@ -152,11 +157,13 @@ def ours(case: Case, given: Skin) -> dict[str, Any]:
     return found | {"vertices": vertices, "triangles": triangles}
 
 
-def peer(python: Path, given: Skin, count: int, energy: str, folder: Path) -> dict[str, Any]:
-    """The peer's cage of as many triangles, measured; or why there is none."""
+def peer(
+    python: Path, given: Skin, count: int, energy: str, folder: Path, rough: dict[str, np.ndarray] | None = None
+) -> dict[str, Any]:
+    """The peer's cage of as many triangles, or from a rough one (`vertices`, `triangles`), measured; or why not."""
     found = folder / "found.npz"
     found.unlink(missing_ok=True)
-    np.savez(folder / "given.npz", skin=given[0], faces=given[1], count=count)
+    np.savez(folder / "given.npz", skin=given[0], faces=given[1], count=count, **(rough or {}))
     command = [str(python), str(PEER), "cage", str(folder / "given.npz"), str(found), energy, str(PEER_SECONDS)]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if done.returncode == OUT_OF_TIME:

@@ -1,6 +1,7 @@
 """Runs in the peer's own environment: `nested-cages` on one skin, and the measures of any cage, by libigl.
 
     python nested_cages_peer.py cage GIVEN.npz FOUND.npz ENERGY SECONDS    the peer's cage, or none in so much time
+    python nested_cages_peer.py decimate GIVEN.npz FOUND.npz               a rough cage: the skin with `count` triangles
     python nested_cages_peer.py measure GIVEN.npz                          one line of JSON on any cage
 
 GIVEN holds `skin`, `faces` and for `cage` either `count` of triangles wanted or a coarse mesh `vertices`, `triangles`
@@ -40,6 +41,15 @@ def cage(given: dict[str, np.ndarray], found: str, energy: str) -> None:
         seconds=time.perf_counter() - start,
         processor=time.process_time() - begun,
     )
+
+
+def decimate(given: dict[str, np.ndarray], found: str) -> None:
+    """By quadric errors, as both are given it."""
+    import igl
+
+    skin, faces = np.asfortranarray(given["skin"]), np.asfortranarray(given["faces"].astype(np.int32))
+    vertices, triangles, *_ = igl.qslim(skin, faces, int(given["count"]), True)
+    np.savez(found, vertices=np.array(vertices), triangles=np.array(triangles).astype(np.int64))
 
 
 def measure(given: dict[str, np.ndarray]) -> dict[str, float]:
@@ -84,6 +94,8 @@ def main() -> None:
     if sys.argv[1] == "cage":
         give_up_after(int(sys.argv[5]))
         cage(given, sys.argv[3], sys.argv[4])
+    elif sys.argv[1] == "decimate":
+        decimate(given, sys.argv[3])
     else:
         print(json.dumps(measure(given)))
 

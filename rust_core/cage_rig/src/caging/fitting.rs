@@ -48,9 +48,8 @@ const FAR: f64 = 0.05;
 const AWAY: f64 = 0.1;
 /// Of the axis the rough cage has to hold at least this part.
 const LEAST: f64 = 0.5;
-/// The axis is bent at so many places at most, and an edge looked at in so many.
+/// The axis is bent at so many places at most.
 const BENDS: usize = 200;
-const LOOKS: usize = 24;
 
 impl Generator {
     /// The rough cage around the skin: valid, drawn tight, with its own faces index for index.
@@ -271,8 +270,18 @@ impl<'a> Room<'a> {
         }
     }
 
+    /// Whether the way from `p` to `q` stays inside. Each step is as long as the room around allows.
     fn is_clear(&self, p: &Point, q: &Point) -> bool {
-        (0..=LOOKS).all(|k| self.depth(&(p + (q - p) * (k as f64 / LOOKS as f64))) > 0.5 * ROOM)
+        let length = (q - p).norm();
+        let mut gone = 0.0;
+        while gone < length {
+            let depth = self.depth(&(p + (q - p) * (gone / length)));
+            if depth < 0.5 * ROOM {
+                return false;
+            }
+            gone += depth;
+        }
+        self.depth(q) >= 0.5 * ROOM
     }
 }
 
