@@ -37,6 +37,7 @@ bench: $(VENV)/.extension $(VENV)/.bench
 	$(PY) tests/bench/report.py
 	cargo bench --quiet -p cage_rig --bench skinning
 	$(PY) tests/bench/bench_caging.py
+	$(PY) tests/bench/bench_fitting.py
 
 # Their answers alone, of small sizes.
 bench-quick: $(VENV)/.extension

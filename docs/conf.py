@@ -14,7 +14,7 @@ language = "en"
 
 extensions = ["myst_parser"]
 source_suffix = {".md": "markdown"}
-exclude_patterns = ["make_pictures", "listing", "generate_bench.md"]
+exclude_patterns = ["make_pictures", "listing", "generate_bench.md", "generate_fit_bench.md"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 smartquotes = False  # messages read as on the screen, so that they are found
