@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import caging, lifecycle, props, selection
 from ..caging import current
 from . import node_events, waiting
+from .around_skins import AroundSkins
 
 # Numbers never move: they are what keymaps and presets store.
 PLACEMENTS = [
@@ -26,7 +25,7 @@ def _offered(_operator: bpy.types.Operator, context: bpy.types.Context, _typed: 
     return [cage.name for cage in caging.cages(context.scene) if cage != context.object]
 
 
-class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
+class CAGE_RIG_OT_generate_cage(AroundSkins, bpy.types.Operator):
     """Generate a cage around the selected skins, along the bones of their armature. Click on bones to add cross sections"""  # noqa: E501
 
     bl_idname = "cage_rig.generate_cage"
@@ -38,18 +37,6 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
         name="Corners", description="Vertices of the cage at each cross section", default=4, min=3, max=8
     )
     triangles: BoolProperty(name="Triangles", description="Make the cage of triangles alone, without quads")
-    clearance: FloatProperty(
-        name="Clearance",
-        description="The least gap between skin and cage, as a share of the character's size",
-        default=3e-4,
-        min=1e-4,
-        max=0.05,
-        precision=4,
-        step=0.05,
-    )
-    tightness: FloatProperty(
-        name="Tightness", description="How strongly the cage is pressed to the skin", default=1.0, min=0.0, max=5.0
-    )
     detail: FloatProperty(
         name="Leave Out",
         description="Limbs thinner than this share of the character's size get no branch of the cage",
@@ -61,10 +48,6 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
     )
     symmetry: BoolProperty(
         name="Symmetry", description="Give a symmetric character a symmetric cage, and edit both sides", default=True
-    )
-    hull: BoolProperty(
-        name="Cage Repaired Hull",
-        description="Enclose a voxel-remeshed copy of the skins: for meshes with holes or crossing parts",
     )
     like: StringProperty(
         name="Like",
@@ -79,7 +62,6 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
     nodes: CollectionProperty(type=props.CageRigBendingNode, options={"HIDDEN"})
 
     by_hand = False  # from a menu or a button: nodes are edited first
-    question = ""  # what a dialog asks
     _run: node_events.Run | None = None
 
     @classmethod
@@ -114,11 +96,11 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
                     nodes,
                     cage=cage,
                     like=self._like(),
-                    tell=self._tell,
+                    tell=self.tell,
                     watch=lambda job: show(job.share),
                 )
         except (caging.GenerateError, lifecycle.BindError) as error:
-            return self._refuse(error)
+            return self.say_no(error)
         return {"FINISHED"}
 
     def _begin(self, context: bpy.types.Context) -> set[str]:
@@ -129,14 +111,7 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
                 context, cage, armature, skins, self._options(), self._own_nodes(), self._like()
             )
         except (caging.GenerateError, lifecycle.BindError) as error:
-            if not getattr(error, "repairable", False) or self.hull:
-                return self._refuse(error)
-            error.show()
-            self.question = str(error)
-            manager = context.window_manager
-            return manager.invoke_props_dialog(
-                self, width=420, title="Cage Repaired Hull?", confirm_text="Cage Repaired Hull"
-            )
+            return self.ask(context, error)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -148,12 +123,12 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
                 self._keep(run)
                 run.give_up()
                 caging.finish(
-                    context, run.job, run.character, run.options, run.editing.nodes, cage=run.cage, tell=self._tell
+                    context, run.job, run.character, run.options, run.editing.nodes, cage=run.cage, tell=self.tell
                 )
                 self._run = None
         except caging.GenerateError as error:
             self.cancel(context)
-            return self._refuse(error)
+            return self.say_no(error)
         except BaseException:
             self.cancel(context)
             raise
@@ -171,8 +146,7 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         if self.question:
-            for line in textwrap.wrap(self.question, 68):
-                layout.label(text=line)
+            self.draw_question()
             return
         layout.use_property_split = True
         if len(self.nodes):
@@ -231,12 +205,3 @@ class CAGE_RIG_OT_generate_cage(bpy.types.Operator):
         for name in OPTIONS:
             setattr(self, name, getattr(run.options, name))
         self._set_nodes(run.editing.nodes)
-
-    def _tell(self, text: str) -> None:
-        self.report({"INFO"}, text)
-
-    def _refuse(self, error: Exception) -> set[str]:
-        if isinstance(error, caging.GenerateError):
-            error.show()
-        self.report({"ERROR"}, str(error))
-        return {"CANCELLED"}

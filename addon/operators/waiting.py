@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Protocol
 
 import bpy
 
@@ -123,47 +123,77 @@ def only_looks(event: bpy.types.Event) -> bool:
     return event.type in LOOKING and not event.alt and not (event.ctrl and event.type.startswith("WHEEL"))
 
 
-class Binds:
-    """An operator that binds: modal where a person calls it and it takes long, at once everywhere else."""
+class Work(Protocol):
+    """What the core does in a thread for an operator."""
 
-    _work: lifecycle.Work | None = None
+    name: str  # of what it is done to
+    job: Any  # has `wait(seconds)`, `stage` and `cancel()`
+
+
+class Waits:
+    """An operator whose work takes long: modal where a person calls it, at once everywhere else."""
+
+    doing = ""  # one word of the status bar
+    cancelled = ""  # what is said after Esc
+    refusals: tuple[type[Exception], ...] = ()
+    _work: Any = None
     _wait: Wait | None = None
 
-    def begin(self, context: bpy.types.Context) -> lifecycle.Work:
-        """Read, and let the core begin. Raises `lifecycle.BindError`."""
+    def begin(self, context: bpy.types.Context) -> Work:
+        """Read, and let the core begin. Raises one of `refusals`."""
         raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context, *, later: bool) -> None:
+        """Wait for the core, write, and report; others may have worked where it is `later`. Raises as `begin`."""
+        raise NotImplementedError
+
+    def share(self) -> float:
+        """How much is done, 0 to 1."""
+        raise NotImplementedError
+
+    def refuse(self, error: Exception, *, by_hand: bool) -> set[str]:
+        """Say why not. `by_hand`: a person has just called it, and may be asked."""
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
+        return self.begin_in_window(context)
+
+    def begin_in_window(self, context: bpy.types.Context) -> set[str]:
+        """Begin, and go on beside the window where it takes long."""
         try:
             self._work = self.begin(context)
-        except lifecycle.BindError as error:
-            return self._refuse(error)
+        except self.refusals as error:
+            return self.refuse(error, by_hand=True)
         if self._work.job.wait(PATIENCE):
-            return self._finish(context, later=False)
-        self._wait = Wait(context, f"Binding '{self._work.name}'", self._work.job.cancel)
+            return self._finish(context, later=False, by_hand=True)
+        self._wait = Wait(context, f"{self.doing} '{self._work.name}'", self._work.job.cancel)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             self._work = self.begin(context)
-        except lifecycle.BindError as error:
-            return self._refuse(error)
-        return self._finish(context, later=False)
+        except self.refusals as error:
+            return self.refuse(error, by_hand=False)
+        with at_cursor(context) as show:
+            while not self._work.job.wait(0.1):
+                show(self.share())
+        return self._finish(context, later=False, by_hand=False)
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         job = self._work.job
         if wants_out(event):
             self.cancel(context)
-            self.report({"INFO"}, "Bind cancelled; nothing was changed")
+            self.report({"INFO"}, self.cancelled)
             return {"CANCELLED"}
         if event.type == "TIMER" and job.wait(0.0):
             self._wait.end()
-            return self._finish(context, later=True)
+            return self._finish(context, later=True, by_hand=True)
         if event.type == "TIMER":
-            self._wait.tell(job.progress, job.stage)
+            self._wait.tell(self.share(), job.stage)
         return {"PASS_THROUGH"} if only_looks(event) else {"RUNNING_MODAL"}
 
     def cancel(self, _context: bpy.types.Context) -> None:
@@ -171,16 +201,26 @@ class Binds:
         if self._wait is not None:
             self._wait.give_up()
 
-    def _finish(self, context: bpy.types.Context, *, later: bool) -> set[str]:
+    def _finish(self, context: bpy.types.Context, *, later: bool, by_hand: bool) -> set[str]:
         try:
-            cage, note = self._work.finish(context, later=later)
-        except lifecycle.BindError as error:
-            return self._refuse(error)
+            self.finish(context, later=later)
+        except self.refusals as error:
+            return self.refuse(error, by_hand=by_hand)
+        return {"FINISHED"}
+
+
+class Binds(Waits):
+    """An operator that binds."""
+
+    doing = "Binding"
+    cancelled = "Bind cancelled; nothing was changed"
+    refusals = (lifecycle.BindError,)
+
+    def finish(self, context: bpy.types.Context, *, later: bool) -> None:
+        cage, note = self._work.finish(context, later=later)
         self.report({"INFO"}, lifecycle.summary(cage))
         if note:
             self.report({"WARNING"}, note)
-        return {"FINISHED"}
 
-    def _refuse(self, error: lifecycle.BindError) -> set[str]:
-        self.report({"ERROR"}, str(error))
-        return {"CANCELLED"}
+    def share(self) -> float:
+        return self._work.job.progress
