@@ -17,6 +17,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Points = NDArray[np.float64]
 Faces = tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]]]  # corners, sizes
+ROUGH = "the rough cage"  # how the core begins a sentence on one
 
 
 class Refusal(Exception):
@@ -32,7 +33,12 @@ class Refusal(Exception):
     @property
     def is_of_skin(self) -> bool:
         """Whether the skin itself can't be used, at a place of it."""
-        return self.place is not None and self.node is None
+        return self.place is not None and self.node is None and not self.is_of_rough
+
+    @property
+    def is_of_rough(self) -> bool:
+        """Whether it is a rough cage that can't be used."""
+        return str(self).startswith(ROUGH)
 
 
 class Cancelled(Exception):
@@ -194,6 +200,11 @@ class Generator:
         """Begin to make the cage. What an earlier one has around nodes that are still there stays."""
         arrangement = None if earlier is None else earlier.arrangement
         return Job(self._core.generate(bending, earlier and earlier[:3], like=like, arrangement=arrangement))
+
+    @_door
+    def fit(self, points: Points, faces: Faces) -> Job:
+        """Begin to make a rough cage, in rig space, enclose the skin: with its own faces, index for index."""
+        return Job(self._core.fit(points, faces))
 
     @property
     def arcs(self) -> list[Arc]:

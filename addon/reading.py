@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 
 import bpy
@@ -68,6 +68,12 @@ def read_meshes(skins: list[bpy.types.Object]) -> list[tuple[positions.Points, t
         )
         for obj in skins
     ]
+
+
+def placed(context: bpy.types.Context, space: bpy.types.Object, obj: bpy.types.Object) -> Matrix:
+    """What brings an object's own space to that of `space`, an armature (at rest) or a mesh. Raises `BindError`."""
+    with at_rest(context, space) if space.type == "ARMATURE" else nullcontext():
+        return _to_rig(obj, armature.to_array(space.matrix_world), space.name)
 
 
 def _to_rig(obj: bpy.types.Object, armature_world: Matrix, armature_name: str) -> Matrix:

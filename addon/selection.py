@@ -57,24 +57,69 @@ def to_generate(
     """
     selected = context.selected_objects
     meshes = [obj for obj in selected if obj.type == "MESH"]
-    cages = [obj for obj in meshes if len(obj.cage_rig_generated.skins) or obj.cage_rig.state != "NONE"]
+    cages = [obj for obj in meshes if _is_cage(obj)]
     if len(cages) > 1:
         raise BindError(f"'{cages[0].name}' and '{cages[1].name}' are cages; select one of them")
     cage = next(iter(cages), None)
-    kept = cage.cage_rig_generated if cage is not None else None
     skins = [obj for obj in meshes if obj != cage and obj.cage_rig.part != "POSED_CAGE"]
-    if not skins and kept is not None:
-        skins = [item.object for item in kept.skins if item.object is not None and item.object.users_collection]
+    if not skins and cage is not None:
+        skins = _caged_by(cage)
     if not skins:
         raise BindError("Select the skin meshes that the cage is to enclose, and their armature")
+    return cage, _armature(selected, skins, cage), skins
+
+
+def to_fit(
+    context: bpy.types.Context,
+) -> tuple[bpy.types.Object, bpy.types.Object | None, list[bpy.types.Object]]:
+    """A cage whose vertices are to be moved; the armature, if there is one; the skins. From the selection.
+
+    The cage is the one mesh that no bones move, or that was a cage before; of several the active object. Raises
+    `BindError` with what is missing.
+    """
+    selected = context.selected_objects
+    meshes = [obj for obj in selected if obj.type == "MESH" and obj.cage_rig.part != "POSED_CAGE"]
+    cages = [obj for obj in meshes if _is_cage(obj)]
+    armature = _armature(selected, [obj for obj in meshes if obj not in cages], next(iter(cages), None))
+    likely = [obj for obj in meshes if obj in cages or not _is_moved(obj, armature)] or meshes
+    active = context.view_layer.objects.active
+    cage = likely[0] if len(likely) == 1 else next((obj for obj in likely if obj == active), None)
+    skins = [obj for obj in meshes if obj != cage] or (_caged_by(cage) if cage is not None else [])
+    if cage is None or not skins:
+        raise BindError("Select the skin meshes and a rough cage around them, and make the cage the active object")
+    other = next((obj for obj in cages if obj != cage), None)
+    if other is not None:
+        raise BindError(f"'{cage.name}' and '{other.name}' are cages; select one of them")
+    return cage, armature, skins
+
+
+def _is_cage(obj: bpy.types.Object) -> bool:
+    return len(obj.cage_rig_generated.skins) > 0 or obj.cage_rig.state != "NONE"
+
+
+def _caged_by(cage: bpy.types.Object) -> list[bpy.types.Object]:
+    """The skins that a generated cage was made for."""
+    kept = cage.cage_rig_generated
+    return [item.object for item in kept.skins if item.object is not None and item.object.users_collection]
+
+
+def _armature(
+    selected: list[bpy.types.Object], skins: list[bpy.types.Object], cage: bpy.types.Object | None
+) -> bpy.types.Object | None:
+    """The armature that is selected, else that of the skins' modifiers, else the one that the cage remembers."""
     armatures = [obj for obj in selected if obj.type == "ARMATURE" and obj.cage_rig.part == "NONE"]
     if not armatures:
         armatures = list({mod.object for obj in skins for mod in obj.modifiers if mod.type == "ARMATURE"} - {None})
-    if not armatures and kept is not None and kept.armature is not None:
-        armatures = [kept.armature]
+    if not armatures and cage is not None and cage.cage_rig_generated.armature is not None:
+        armatures = [cage.cage_rig_generated.armature]
     if len(armatures) > 1:
         raise BindError(f"Select one armature with the skins; {len(armatures)} are meant")
-    return cage, next(iter(armatures), None), skins
+    return next(iter(armatures), None)
+
+
+def _is_moved(obj: bpy.types.Object, armature: bpy.types.Object | None) -> bool:
+    """Whether a mesh has vertex groups of the armature's bones."""
+    return armature is not None and any(group.name in armature.data.bones for group in obj.vertex_groups)
 
 
 def _cage_among(meshes: list[bpy.types.Object], active: bpy.types.Object | None) -> bpy.types.Object:

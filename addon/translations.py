@@ -68,6 +68,7 @@ LABELS: dict[str, tuple[str, str, str]] = {
 BUTTONS: dict[str, tuple[str, str, str]] = {
     "Bind Cage Rig": ("Käfig-Rig binden", "Lier la cage", "Vincular jaula"),
     "Generate Cage": ("Käfig erzeugen", "Générer une cage", "Generar jaula"),
+    "Fit Cage": ("Käfig anpassen", "Ajuster la cage", "Ajustar jaula"),
     "Edit Generated Cage": ("Erzeugten Käfig bearbeiten", "Modifier la cage générée", "Editar jaula generada"),
     "Generate": ("Erzeugen", "Générer", "Generar"),
     "Key Cage": ("Käfig-Schlüssel", "Insérer une clé de cage", "Clave de jaula"),

@@ -23,6 +23,15 @@ def broken_vertices(
     return np.isin(place, edges[count != 2])
 
 
+def corners_of(
+    faces: tuple[NDArray[np.integer], NDArray[np.integer]], chosen: NDArray[np.bool_], count: int
+) -> NDArray[np.bool_]:
+    """Which of so many vertices are corners of the chosen faces (`#F`)."""
+    found = np.zeros(count, bool)
+    found[faces[0][np.repeat(chosen, faces[1])]] = True
+    return found
+
+
 def select_vertices(mesh: bpy.types.Mesh, chosen: NDArray[np.bool_]) -> None:
     """Select these vertices and nothing else, so that they are seen in Edit Mode. Not in Edit Mode."""
     vertices = np.asarray(chosen, bool)

@@ -87,6 +87,12 @@ def write_base(mesh: bpy.types.Mesh, points: Points) -> None:
     mesh.update_tag()
 
 
+def move(mesh: bpy.types.Mesh, points: NDArray[np.floating]) -> None:
+    """Write base coordinates as `write_base` does, slower, so that the object's bounding box follows."""
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(points, np.float32).ravel())
+    mesh.update()
+
+
 def edit_vertex_count(mesh: bpy.types.Mesh) -> int:
     """Vertices of the mesh as edited: of the edit mesh in Edit Mode, else of the mesh."""
     return len(bmesh.from_edit_mesh(mesh).verts) if mesh.is_editmode else len(mesh.vertices)

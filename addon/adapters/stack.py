@@ -49,6 +49,12 @@ def unlike_weights(obj: bpy.types.Object, armature: bpy.types.Object) -> str:
     return ""
 
 
+def reshaping(obj: bpy.types.Object) -> str:
+    """The name of a shown modifier that gives the mesh another shape at rest; empty where there is none."""
+    kept = HARMLESS | {"ARMATURE"}
+    return next((m.name for m in obj.modifiers if m.show_viewport and m.type not in kept), "")
+
+
 def preserves_volume(obj: bpy.types.Object, armature: bpy.types.Object) -> bool:
     """Whether the object's modifier of this armature has Preserve Volume on."""
     ours = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object == armature]

@@ -8,6 +8,7 @@
 The object that comes back is a closed mesh around the skins at rest, ready for `lifecycle.bind`. It keeps how it was
 made in `cage.cage_rig_generated`, and for each vertex the cross section (attribute `cage_rig_section`) and the bone
 (vertex groups) that it belongs to. Where no cage can be made, `GenerateError` says why, and nothing has changed.
+`fit_cage` moves the vertices of a cage that somebody made so that it encloses the skins.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from .alike import cages, corners_of, suggested
 from .character import Character
 from .course import OnBone
 from .editing import Editing, Source
+from .fitting import Fitting, fit_cage
 from .options import Options
 from .refusals import GenerateError
 from .result import SECTION, like_of, nodes_of, options_of, refuse_cage
@@ -31,6 +33,7 @@ __all__ = [
     "Cancelled",
     "Character",
     "Editing",
+    "Fitting",
     "GenerateError",
     "Job",
     "OnBone",
@@ -40,6 +43,7 @@ __all__ = [
     "corners_of",
     "edit",
     "finish",
+    "fit_cage",
     "generate_cage",
     "like_of",
     "make",

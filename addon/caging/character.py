@@ -148,5 +148,9 @@ def left_out(character: Character, dropped: list[int]) -> list[str]:
     bones = character.course.left_out(dropped)
     if not bones or character.armature is None:
         return []
-    named = ", ".join(f"'{name}'" for name in bones[:3]) + (f" and {len(bones) - 3} more" if len(bones) > 3 else "")
-    return [f"Without a branch of the cage, as they don't stick out of the skin: {named}"]
+    return [f"Without a branch of the cage, as they don't stick out of the skin: {listed(bones)}"]
+
+
+def listed(names: list[str]) -> str:
+    """The first of them, and how many more there are."""
+    return ", ".join(f"'{name}'" for name in names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

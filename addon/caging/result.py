@@ -63,7 +63,7 @@ def write(
     arrangement = made.report["arrangement"]
     cage.cage_rig_generated.arrangement = "" if arrangement is None else " ".join(map(str, arrangement))
     cage.cage_rig_generated.fingerprint = character.generator.given.fingerprint
-    _select(context, cage, character)
+    select(context, cage, character)
     return cage
 
 
@@ -107,7 +107,8 @@ def _remember(cage: bpy.types.Object, character: Character, options: Options, no
         item.name, item.position = node
 
 
-def _select(context: bpy.types.Context, cage: bpy.types.Object, character: Character) -> None:
+def select(context: bpy.types.Context, cage: bpy.types.Object, character: Character) -> None:
+    """Select what Bind needs, the cage active."""
     chosen = (*character.skins, character.armature, cage)
     for obj in context.view_layer.objects:
         obj.select_set(obj in chosen)

@@ -16,6 +16,7 @@ from .delete_key import CAGE_RIG_OT_delete_key
 from .discard_edit import CAGE_RIG_OT_discard_edit
 from .drop_coordinates import CAGE_RIG_OT_drop_coordinates
 from .export_coordinates import CAGE_RIG_OT_export_coordinates
+from .fit_cage import CAGE_RIG_OT_fit_cage
 from .fix_problem import CAGE_RIG_OT_fix_problem
 from .generate_cage import CAGE_RIG_OT_generate_cage
 from .import_rig import CAGE_RIG_FH_prototype, CAGE_RIG_OT_import_rig
@@ -29,6 +30,7 @@ from .unbind import CAGE_RIG_OT_unbind
 
 CLASSES = (
     CAGE_RIG_OT_generate_cage,
+    CAGE_RIG_OT_fit_cage,
     CAGE_RIG_OT_bind,
     CAGE_RIG_OT_rebind,
     CAGE_RIG_OT_unbind,
@@ -60,6 +62,7 @@ def _samples_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
 def _object_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator(CAGE_RIG_OT_generate_cage.bl_idname)
+    self.layout.operator(CAGE_RIG_OT_fit_cage.bl_idname)
     self.layout.operator(CAGE_RIG_OT_bind.bl_idname)
 
 

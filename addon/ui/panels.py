@@ -47,6 +47,7 @@ class _Main:
             self.layout.operator("cage_rig.generate_cage", icon="MOD_LATTICE", text=_caging_label(context.object))
             self.layout.separator()
             self.layout.label(text="Select skins, armature and cage:")
+            self.layout.operator("cage_rig.fit_cage", icon="MOD_SHRINKWRAP")
             row = self.layout.row()
             row.scale_y = 1.4
             row.operator("cage_rig.bind", icon="LINKED")

@@ -43,16 +43,18 @@ def refused(**options: object) -> str:
 def state() -> dict[str, object]:
     """All that a refusal must leave as it is."""
     kinds = ("objects", "meshes", "armatures", "collections", "node_groups", "images", "actions")
-    meshes = {
-        mesh.name: (rest_of(mesh).tobytes(), len(mesh.polygons), sorted(mesh.attributes.keys()))
-        for mesh in bpy.data.meshes
-    }
+    meshes = {mesh.name: (rest_of(mesh).tobytes(), len(mesh.polygons), attributes(mesh)) for mesh in bpy.data.meshes}
     objects = {
         obj.name: (tuple(map(tuple, obj.matrix_world)), obj.select_get(), obj.cage_rig_generated.own_nodes)
         for obj in bpy.data.objects
     }
     poses = {armature.name: armature.pose_position for armature in bpy.data.armatures}
     return {"counts": [len(getattr(bpy.data, kind)) for kind in kinds], **meshes, **objects, **poses}
+
+
+def attributes(mesh: bpy.types.Mesh) -> list[str]:
+    """Without those of a selection, which shows what a refusal is about."""
+    return sorted(item.name for item in mesh.attributes if not item.name.startswith(".select"))
 
 
 def rest_of(mesh: bpy.types.Mesh) -> Points:
