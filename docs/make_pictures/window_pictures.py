@@ -17,8 +17,9 @@ import gallery
 import stage
 from stage import LOOK
 
-from blend_fixtures.build import add_mesh, add_shape_key, build_arm
+from blend_fixtures.build import add_mesh, add_shape_key, build_arm, build_character
 from blend_fixtures.corrections import BULGE, driven_biceps
+from blend_fixtures.doll import doll
 
 Acts = Iterator[float | None]
 
@@ -326,7 +327,34 @@ def generate() -> Acts:
     yield from gallery.at_work("generate_bend", rig.skins, rig.armature, cage)
 
 
-ACTS = {act.__name__: act for act in (generate, bind, panels, drag, refit, weights, parts, driven, bake, keys)} | {
+def fit() -> Acts:
+    """A cage that was decimated from the skin, and crosses it; and fitted."""
+    rig = stage.start(lambda: build_character(doll(cell=0.03)), bind=False, frame=1)
+    bpy.data.objects.remove(rig.cage)
+    skin = rig.skins[0]
+    modifier = skin.modifiers.new("Decimate", "DECIMATE")
+    modifier.ratio, modifier.use_collapse_triangulate = 0.02, True
+    mesh = bpy.data.meshes.new_from_object(skin.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+    skin.modifiers.remove(modifier)
+    cage = bpy.data.objects.new("Rough", mesh)
+    cage.display_type = "WIRE"
+    bpy.context.scene.collection.objects.link(cage)
+    rig.armature.hide_set(True)
+    stage.only(cage)
+    stage.turn(25.0, 8.0)
+    yield from settle()
+    box = stage.around([cage, skin], 40)
+    stage.picture("fit_before", box)
+    rig.armature.hide_set(False)
+    stage.only(skin, rig.armature, cage, active=cage)
+    bpy.ops.cage_rig.fit_cage()
+    rig.armature.hide_set(True)
+    stage.only(cage)
+    yield from settle()
+    stage.picture("fit", box, side_by_side=["fit_before"])
+
+
+ACTS = {act.__name__: act for act in (generate, fit, bind, panels, drag, refit, weights, parts, driven, bake, keys)} | {
     "gallery": gallery.everyone
 }
 
