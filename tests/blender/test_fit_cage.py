@@ -215,6 +215,20 @@ def test_a_generated_cage_goes_on_as_one(caging: ModuleType) -> None:
     assert same > 0.3
 
 
+def test_several_skins_are_enclosed_by_their_common_hull(character: RigObjects, caging: ModuleType) -> None:
+    first, cage = character.skins[0], around(character)
+    select([first], first)
+    bpy.ops.object.duplicate()
+    second = bpy.context.object
+    second.scale, second.location = (0.5, 1.3, 1.3), (0.0, 0.0, 0.0)
+    update()
+    both = RigObjects([first, second], character.armature, None)
+    told: list[str] = []
+    caging.fit_cage(bpy.context, cage, both.skins, both.armature, tell=told.append)
+    assert told[0].endswith(". The skins are 2 closed parts; their common hull was caged")
+    assert measure(cage, both) == GOOD
+
+
 def test_limbs_that_it_leaves_out_are_named(caging: ModuleType) -> None:
     found = uncaged(build_character(doll()))
     cage = box((-0.3, -0.25, -0.95), (0.3, 0.25, 1.1), 4)
