@@ -64,10 +64,10 @@ def main() -> None:
         if python is None:
             results.append((target, f"NOT RUN: no Python {target.python}, or its bpy can't be installed"))
             continue
-        core = [
-            str(path) for path in (ROOT / "dist" / "wheels").glob("cage_rig_core-*.whl")
-        ]  # tests ask it directly too
-        subprocess.run([str(python), "-m", "pip", "install", "-q", "--force-reinstall", "--no-deps", *core], check=True)
+        # Tests ask the core directly too.
+        wheels = [str(path) for path in (ROOT / "dist" / "wheels").glob("cage_rig_core-*.whl")]
+        install = [str(python), "-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps", *wheels]
+        subprocess.run(install, check=True)
         done = subprocess.run([str(python), "-m", "pytest", "tests/blender"], cwd=ROOT, check=False)
         results.append((target, "passed" if done.returncode == 0 else f"FAILED (exit code {done.returncode})"))
     print()

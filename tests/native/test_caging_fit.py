@@ -100,3 +100,54 @@ def test_a_cage_of_another_level_of_detail_is_fitted():
     cage, polygons, fitted = core.fit_cage(*given, vertices, faces)
     check(*given[:2], cage, polygons, fitted)
     assert fitted["volume_ratio"] < 1.1 * report["volume_ratio"]
+
+
+def broken(kind, vertices, corners, sizes, random):
+    """A rough cage with something wrong."""
+    one, other = random.choice(len(vertices), 2, replace=False)
+    if kind == "noisy":
+        return vertices + random.normal(0, 0.02, vertices.shape), corners, sizes
+    if kind == "far too large":
+        return vertices * 5, corners, sizes
+    if kind == "flat":
+        return vertices * [0, 1, 1], corners, sizes
+    if kind == "two vertices in one place":
+        return np.where(np.arange(len(vertices))[:, None] == one, vertices[other], vertices), corners, sizes
+    if kind == "another corner":
+        return vertices, np.where(np.arange(len(corners)) == 7, other, corners), sizes
+    if kind == "inside out":
+        return vertices, corners[::-1], sizes[::-1]
+    if kind == "a spike":
+        return np.where(np.arange(len(vertices))[:, None] == one, 1e6 * vertices, vertices), corners, sizes
+    if kind == "empty":
+        return vertices[:0], corners[:0], sizes[:0]
+    if kind == "a vertex that is not there":
+        return vertices, np.where(np.arange(len(corners)) == 7, 10**9, corners), sizes
+    return vertices + random.normal(0, 0.3, 3), corners, sizes
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "noisy",
+        "far too large",
+        "flat",
+        "two vertices in one place",
+        "another corner",
+        "inside out",
+        "a spike",
+        "empty",
+        "a vertex that is not there",
+        "elsewhere",
+    ],
+)
+def test_broken_rough_cages_are_named_or_fitted(doll, rough, kind, seed):
+    vertices, (corners, sizes) = rough
+    vertices, corners, sizes = broken(kind, vertices, corners, sizes, np.random.default_rng(seed))
+    try:
+        cage, polygons, report = core.fit_cage(*doll, vertices, (corners, sizes))
+    except core.CagingError as refused:
+        assert "the rough cage" in str(refused)
+        return
+    check(*doll[:2], cage, polygons, report)
