@@ -68,8 +68,9 @@ class Running:
         an edit of the posed cage wrote.
         """
         if len(rest) != len(self.session.snapshot.cage):
-            counts = f"{len(rest)} vertices of {len(self.session.snapshot.cage)}"
-            raise SessionError(f"its modifiers make {counts}; switch them off")
+            raise SessionError(
+                f"its modifiers make {len(rest)} vertices of {len(self.session.snapshot.cage)}; switch them off"
+            )
         if self.cage_wanted is not None:
             known = positions.close(rest, self.cage_wanted, 1e-6 * self.session.size)
         else:

@@ -103,4 +103,4 @@ def test_the_menus_offer_samples_and_cages(samples: ModuleType) -> None:
         offered[menu.__name__] = recorder.drawn
     assert offered["VIEW3D_MT_add"] == ["CAGE_RIG_MT_samples"]
     assert offered["VIEW3D_MT_mesh_add"] == ["cage_rig.generate_cage"]
-    assert offered["VIEW3D_MT_object"] == ["cage_rig.generate_cage", "cage_rig.bind"]
+    assert offered["VIEW3D_MT_object"] == ["cage_rig.generate_cage", "cage_rig.fit_cage", "cage_rig.bind"]
