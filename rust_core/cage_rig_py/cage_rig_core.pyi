@@ -108,11 +108,13 @@ class Work(TypedDict):
     reverse_solves: int
     rest_passes: int
     rest_column_passes: int  # those of them that read few columns alone, as in a drag
+    rest_shape_passes: int  # those of them that read shapes the cage goes through, as between keys
     skin_passes: int
     cage_fits: int
     center_integrations: int
     center_passes: int
     center_column_passes: int
+    center_shape_passes: int
 
 @final
 class Bones:

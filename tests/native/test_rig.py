@@ -168,11 +168,13 @@ def test_work_and_report_are_plain_dictionaries(bar, bent):
         "reverse_solves": 0,
         "rest_passes": 0,
         "rest_column_passes": 0,
+        "rest_shape_passes": 0,
         "skin_passes": 1,
         "cage_fits": 1,
         "center_integrations": 0,
         "center_passes": 0,
         "center_column_passes": 0,
+        "center_shape_passes": 0,
     }
     rig.pose(bent)
     read(rig)

@@ -4,7 +4,8 @@
 //! so that all see the same machine. One thread, but where threads are named.
 //!
 //! - product: M = M₀ + Φ(C − C₀) for a coarse character, whose Φ stays in the caches, up to one that is bound by memory;
-//!   then a drag of one and of five cage vertices, 16-bit weights, and four frames at once as bakes make them.
+//!   then a drag of one and of five cage vertices, a cage between two keys, 16-bit weights, and four frames at once as
+//!   bakes make them.
 //! - skinning: 40,000 vertices of four bones each, rigid or scaled, on every path.
 //! - frame: from transforms to posed skin and cage, as an add-on waits for it, alone and with threads.
 //!
@@ -19,6 +20,7 @@ use cage_rig::skinning::{FrameWeights, Scratch, SkinningInput, METHODS};
 use cage_rig::sync::{BindInput, Frame};
 use cage_rig::{CoupledRig, Matrix3, Point, Precision, Transform};
 use common::large::snake;
+use common::random::Random;
 use pulp::{Arch, Simd, WithSimd};
 use std::hint::black_box;
 use std::time::Instant;
@@ -94,9 +96,15 @@ fn input((rings, around, cage_rings): (usize, usize, usize)) -> BindInput {
     input
 }
 
-/// The same cage with its first vertices moved a little more.
-fn dragged(cage: &mut [Point], vertices: usize) -> &[Point] {
-    cage.iter_mut().take(vertices).for_each(|c| c.y += 1e-4);
+/// The same cage with its first vertices moved a little more, each by itself: no shapes make it up.
+fn dragged<'a>(cage: &'a mut [Point], vertices: usize, random: &mut Random) -> &'a [Point] {
+    cage.iter_mut().take(vertices).for_each(|c| c.y += random.between(5e-5, 2e-4));
+    cage
+}
+
+/// The cage on a line between two keys.
+fn keyed<'a>(cage: &'a mut [Point], bound: &[Point], part: f64) -> &'a [Point] {
+    cage.iter_mut().zip(bound).for_each(|(c, c0)| *c = c0 * (1.0 + 0.1 * part));
     cage
 }
 
@@ -109,7 +117,8 @@ fn product(character: (usize, usize, usize)) {
     let (rows, columns) = (rig.cage_coords().len(), rig.cage_coords().columns());
     let (mut cage, arch, memory) = (rig.rest_cage().to_vec(), Arch::new(), vec![1.0f32; rows * columns]);
     let (still, mut posed) = (pose(false, 1.0), vec![[0.0f32; 3]; 4 * rows]);
-    let mut least = [Least(f64::INFINITY); 9];
+    let mut least = [Least(f64::INFINITY); 10];
+    let (bound, mut line, mut random) = (cage.clone(), cage.clone(), Random::new(1));
     let operations = arch.dispatch(MultiplyAdds(10_000)).1;
     for _ in 0..(4_000_000_000 / (rows * columns * 40)).clamp(60, 1000) {
         least[0].of(|| arch.dispatch(Read(black_box(&memory))));
@@ -117,15 +126,21 @@ fn product(character: (usize, usize, usize)) {
         for (at, moved) in [(2, columns), (3, 1), (4, 5)] {
             // The first step of a drag copies its columns, and what comes after others finds the caches full of theirs.
             for _ in 0..3 {
-                rig.edit_rest_cage(dragged(&mut cage, moved)).expect("a valid cage");
+                rig.edit_rest_cage(dragged(&mut cage, moved, &mut random)).expect("a valid cage");
                 least[at].of(|| rig.rest_skin()[0]);
             }
         }
+        // Seen, known, and read twice.
+        for k in 1..5 {
+            rig.edit_rest_cage(keyed(&mut line, &bound, f64::from(k))).expect("a valid cage");
+            least[9].of(|| rig.rest_skin()[0]);
+        }
         for _ in 0..3 {
-            half.edit_rest_cage(dragged(&mut cage, columns)).expect("a valid cage");
+            half.edit_rest_cage(dragged(&mut cage, columns, &mut random)).expect("a valid cage");
             least[5].of(|| half.rest_skin()[0]);
         }
-        let cages: Vec<Vec<Point>> = (0..4).map(|_| dragged(&mut cage, columns).to_vec()).collect();
+        let cages: Vec<Vec<Point>> =
+            (0..4).map(|_| dragged(&mut cage, columns, &mut random).to_vec()).collect();
         let frames: Vec<Frame> = cages.iter().map(|cage| (&cage[..], &still[..])).collect();
         let same: Vec<Frame> = (0..4).map(|_| frames[0]).collect();
         for _ in 0..3 {
@@ -136,7 +151,7 @@ fn product(character: (usize, usize, usize)) {
             least[8].of(|| rig.posed_skins(&frames[..1], None, &mut posed[..rows]));
         }
     }
-    let [read, peak, whole, one, five, halves, four, four_same, single] = least.map(|least| least.0);
+    let [read, peak, whole, one, five, halves, four, four_same, single, keyed] = least.map(|least| least.0);
     let (bytes, multiplies) = ((4 * rows * columns) as f64, (3 * rows * columns) as f64);
     println!(
         "product {rows} by {columns}: {:.4} ms; {:.1} GB/s of weights, {:.0} % of reading them alone; {:.0} % of peak \
@@ -155,6 +170,7 @@ fn product(character: (usize, usize, usize)) {
     for (what, why, time) in [
         ("drag of one cage vertex", "one column of Φ instead of all", one),
         ("drag of five cage vertices", "five columns of Φ instead of all", five),
+        ("cage between two keys", "a shape that it was seen in instead of Φ", keyed),
         ("16-bit weights", "half as much to read where Φ fits no cache", halves),
     ] {
         let (time, whole) = (time * 1e3, whole * 1e3);
@@ -163,9 +179,10 @@ fn product(character: (usize, usize, usize)) {
     // Four frames of one cage have one product, and four skinnings each.
     let together = (four - four_same) + whole;
     println!(
-        "  drag of one {:.1}, of five {:.1} times cheaper; 16 bits {:.2} times; four at once: product {:.2}, posed {:.2} times",
+        "  drag of one {:.1}, of five {:.1}, keyed {:.1} times cheaper; 16 bits {:.2} times; four at once: product {:.2}, posed {:.2} times",
         whole / one,
         whole / five,
+        whole / keyed,
         whole / halves,
         4.0 * whole / together,
         4.0 * single / four,
@@ -204,9 +221,10 @@ fn frames(character: (usize, usize, usize)) {
     let (rows, columns) = (rig.cage_coords().len(), rig.rest_cage().len());
     let poses = [pose(false, 1.0), pose(false, 0.7)];
     let (mut cage, mut least) = (rig.rest_cage().to_vec(), [Least(f64::INFINITY); 4]);
+    let mut random = Random::new(2);
     for _ in 0..300 {
         let mut frame = |at: usize, moved: usize| {
-            let cage = dragged(&mut cage, moved);
+            let cage = dragged(&mut cage, moved, &mut random);
             least[at].of(|| {
                 rig.play(cage, &poses[at % 2], None).expect("a valid frame");
                 rig.posed_skin();

@@ -378,11 +378,13 @@ impl CoupledRig {
         work.set_item("reverse_solves", done.reverse_solves)?;
         work.set_item("rest_passes", done.rest_passes)?;
         work.set_item("rest_column_passes", done.rest_column_passes)?;
+        work.set_item("rest_shape_passes", done.rest_shape_passes)?;
         work.set_item("skin_passes", done.skin_passes)?;
         work.set_item("cage_fits", done.cage_fits)?;
         work.set_item("center_integrations", done.center_integrations)?;
         work.set_item("center_passes", done.center_passes)?;
         work.set_item("center_column_passes", done.center_column_passes)?;
+        work.set_item("center_shape_passes", done.center_shape_passes)?;
         Ok(work)
     }
 

@@ -8,6 +8,7 @@
 
 mod apart;
 mod halves;
+mod shapes;
 mod singles;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ use crate::threads;
 pub(crate) use apart::Apart;
 use halves::{Half, HalfMoves, Pair};
 use rayon::prelude::*;
+use shapes::ShapeMoves;
 use singles::{Single, SingleMoves};
 
 /// Rows of a panel.
@@ -52,6 +54,14 @@ enum Numbers {
     Single(Vec<Single>),
     /// Two columns a strip, and the scales of panels.
     Half(Vec<Half>, Vec<f32>),
+}
+
+/// What a product multiplies.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Factor<'a> {
+    Panels(&'a Panels),
+    /// Columns of points: three numbers a row, one for each of the three of a step.
+    Shapes(&'a [Apart]),
 }
 
 /// A column that moves, and how far in each of some frames.
@@ -151,17 +161,7 @@ impl Panels {
 
     /// Writes `from` + mask · (matrix · `steps`) + offsets, `#rows by 3`.
     pub(crate) fn write(&self, product: &Product, steps: &mut Steps, out: &mut [[f32; 3]]) {
-        let steps = self.rounded(steps);
-        let numbers = out.len() * steps.moved.len();
-        if numbers < PARALLEL_FROM {
-            product.path.run(Write { panels: self, product, first: 0, steps, out: [out] });
-            return;
-        }
-        let shares = out.chunks_mut(SHARE * PANEL).enumerate();
-        threads::each(shares, numbers / PARALLEL_FROM, |(share, out)| {
-            let first = share * SHARE * PANEL;
-            product.path.run(Write { panels: self, product, first, steps, out: [out] });
-        });
+        Factor::Panels(self).write(product, steps, out);
     }
 
     /// The same for several frames at once.
@@ -171,9 +171,9 @@ impl Panels {
         steps: &mut Steps<FRAMES>,
         [a, b, c, d]: [&mut [[f32; 3]]; FRAMES],
     ) {
-        let steps = self.rounded(steps);
+        let (factor, steps) = (Factor::Panels(self), self.rounded(steps));
         if a.len() * steps.moved.len() * FRAMES < PARALLEL_FROM {
-            product.path.run(Write { panels: self, product, first: 0, steps, out: [a, b, c, d] });
+            product.path.run(Write { factor, product, first: 0, steps, out: [a, b, c, d] });
             return;
         }
         let rows = SHARE * PANEL;
@@ -181,7 +181,7 @@ impl Panels {
         let cd = c.par_chunks_mut(rows).zip(d.par_chunks_mut(rows));
         ab.zip(cd).enumerate().for_each(|(share, ((a, b), (c, d)))| {
             let first = share * rows;
-            product.path.run(Write { panels: self, product, first, steps, out: [a, b, c, d] });
+            product.path.run(Write { factor, product, first, steps, out: [a, b, c, d] });
         });
     }
 
@@ -193,9 +193,33 @@ impl Panels {
     }
 }
 
+impl Factor<'_> {
+    /// Writes `from` + mask · (matrix · `steps`) + offsets, `#rows by 3`.
+    pub(crate) fn write(self, product: &Product, steps: &mut Steps, out: &mut [[f32; 3]]) {
+        let (steps, width) = match self {
+            Self::Panels(panels) => {
+                let steps = panels.rounded(steps);
+                (steps, steps.moved.len())
+            }
+            // Where few columns are read, what they are added to counts.
+            Self::Shapes(_) => (&*steps, 3 * steps.moved.len() + 6),
+        };
+        let numbers = out.len() * width;
+        if numbers < PARALLEL_FROM {
+            product.path.run(Write { factor: self, product, first: 0, steps, out: [out] });
+            return;
+        }
+        let shares = out.chunks_mut(SHARE * PANEL).enumerate();
+        threads::each(shares, numbers / PARALLEL_FROM, |(share, out)| {
+            let first = share * SHARE * PANEL;
+            product.path.run(Write { factor: self, product, first, steps, out: [out] });
+        });
+    }
+}
+
 /// Rows of a product from row `first` on, the first of a panel.
 struct Write<'a, const F: usize> {
-    panels: &'a Panels,
+    factor: Factor<'a>,
     product: &'a Product<'a>,
     first: usize,
     steps: &'a Steps<F>,
@@ -205,10 +229,19 @@ struct Write<'a, const F: usize> {
 impl<const F: usize> Kernel for Write<'_, F> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
-        let (columns, first, steps) = (self.panels.columns, self.first / PANEL, self.steps);
-        match &self.panels.numbers {
+        let (first, steps) = (self.first / PANEL, self.steps);
+        let Panels { columns, numbers } = match self.factor {
+            Factor::Panels(panels) => panels,
+            Factor::Shapes(columns) => {
+                return self.of(lanes, |panel, f| {
+                    let panel = first + panel;
+                    ShapeMoves { columns, panel, steps: &steps.moved, f }
+                })
+            }
+        };
+        match numbers {
             Numbers::Single(strips) => self.of(lanes, |panel, f| {
-                let strips = &strips[(first + panel) * columns..][..columns];
+                let strips = &strips[(first + panel) * columns..][..*columns];
                 SingleMoves { strips, steps: &steps.moved, f }
             }),
             Numbers::Half(strips, scales) => self.of(lanes, |panel, f| {

@@ -1,44 +1,27 @@
 //! A rest skin that follows few cage vertices: what is kept so that only their columns are read.
 //!
 //! While a drag moves the same few vertices, M = M_b + Φ_K (C − C_b)_K: M_b is the skin of a cage C_b
-//! near by, made by a whole product, and Φ_K the columns of the vertices that differ from it, copied
+//! near by, made from M₀, and Φ_K the columns of the vertices that differ from it, copied
 //! once. Nothing is added to what a drag itself has made, so nothing drifts however long it is.
 
+use super::passes::{Columns, Pass};
 use super::rest_skin::{Confines, RestSkin};
-use crate::panels::{Apart, Panels, Step, Steps};
+use crate::panels::{Apart, Factor, Panels, Step, Steps};
 use crate::points::{to_single, Point};
 
 /// A drag moves at most this part of the cage, and at most so many vertices.
 const PART: usize = 4;
 const MOST: usize = 16;
 
-/// How a pass was made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pass {
-    /// From all columns that are not as bound.
-    Whole,
-    /// From the columns of few vertices.
-    Columns,
-}
-
-/// Φ_K, C − C_b and M_b.
-pub(super) struct Columns<'a> {
-    pub(super) panels: &'a Panels,
-    pub(super) steps: &'a mut Steps,
-    pub(super) from: &'a Apart,
-}
-
-/// What a rest skin (or centers) keeps between passes.
+/// What a drag keeps between passes.
 #[derive(Debug, Clone, Default)]
-pub struct Drag {
+pub(super) struct Drag {
     /// C of the last pass; empty before it.
     last: Vec<Point>,
-    /// The last pass was whole, and wrote nothing but M.
+    /// The last pass was made from M₀, and wrote nothing but M.
     plain: bool,
     /// C_b, M_b and Φ_K; none before a drag.
     near: Option<Near>,
-    /// Of the present pass.
-    pub(super) steps: Steps,
     /// Cage vertices that are elsewhere than in C_b.
     apart: Vec<usize>,
 }
@@ -54,12 +37,12 @@ struct Near {
 
 impl Drag {
     /// Of a skin that rests in `cage` (C₀, `#C by 3`).
-    pub fn new(cage: &[Point]) -> Self {
+    pub(super) fn new(cage: &[Point]) -> Self {
         Self { last: cage.to_vec(), plain: true, apart: Vec::with_capacity(MOST + 1), ..Self::default() }
     }
 
     /// What the kept skin was made under has changed: all is forgotten but the memory.
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.last.clear();
         self.near = None;
     }
@@ -72,31 +55,32 @@ impl Drag {
         skin: &RestSkin,
         confines: &Confines,
         written: &[[f32; 3]],
+        steps: &mut Steps,
     ) -> Option<Columns<'_>> {
         let most = (cage.len() / PART).min(MOST);
         if !self.near.as_ref().is_some_and(|near| differ_in(cage, &near.cage, most, &mut self.apart)) {
             if self.last.is_empty() || !differ_in(cage, &self.last, most, &mut self.apart) {
                 return None;
             }
-            self.begin(skin, confines, written);
+            self.begin(skin, confines, written, steps);
         }
         let near = self.near.as_mut()?;
         near.take_in(&self.apart, skin);
         let by = |&k: &usize| to_single(&(cage[k] - near.cage[k]));
         let moved = near.moved.iter().enumerate();
-        self.steps.set(moved.map(|(column, k)| Step { column, by: [by(k)] }));
-        Some(Columns { panels: &near.columns, steps: &mut self.steps, from: &near.skin })
+        steps.set(moved.map(|(column, k)| Step { column, by: [by(k)] }));
+        Some(Columns { factor: Factor::Panels(&near.columns), from: &near.skin })
     }
 
     /// A drag from where the last pass ended, in the memory of the one before it.
-    fn begin(&mut self, skin: &RestSkin, confines: &Confines, written: &[[f32; 3]]) {
+    fn begin(&mut self, skin: &RestSkin, confines: &Confines, written: &[[f32; 3]], steps: &mut Steps) {
         let mut place = self.near.take().map_or_else(Apart::default, |near| near.skin);
         if self.plain {
             place.keep(written);
         } else {
             let bare = Confines { offsets: None, ..*confines };
             let mut whole = written.to_vec();
-            skin.write_whole(&self.last, &bare, &mut self.steps, &mut whole);
+            skin.write_whole(&self.last, &bare, steps, &mut whole);
             place.keep(&whole);
         }
         let columns = skin.coords().select(&[]);
@@ -105,7 +89,7 @@ impl Drag {
 
     /// The pass to `cage` is done.
     pub(super) fn done(&mut self, cage: &[Point], pass: Pass, confines: &Confines) {
-        self.plain = pass == Pass::Whole && confines.offsets.is_none();
+        self.plain = pass != Pass::Columns && confines.offsets.is_none();
         self.last.clear();
         self.last.extend_from_slice(cage);
     }

@@ -1,11 +1,11 @@
 //! What a frame makes of the three large arrays, when they are read and due.
 //!
 //! Everything that it works with stays from frame to frame: after the first one none allocates, but
-//! for the columns of a drag that begins, and what the thread pool keeps of its jobs.
+//! for the columns of a drag that begins, the shapes of a cage that is keyed, and what the thread pool keeps of its jobs.
 
 use super::bake_frames::Ahead;
 use super::cage_updater::FitScratch;
-use super::drag::{Drag, Pass};
+use super::passes::{Kept, Pass};
 use super::skeleton_updater::JointMotion;
 use super::CoupledRig;
 use crate::points::Point;
@@ -14,7 +14,7 @@ use crate::skinning::{Scratch, SkinningInput};
 /// What frames work with.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Buffers {
-    pub(super) drag: Drag,
+    pub(super) kept: Kept,
     /// Those last read, or those before the present ones.
     pub(super) motions: Vec<JointMotion>,
     pub(super) ahead: Ahead,
@@ -26,7 +26,7 @@ pub(super) struct Buffers {
 impl Buffers {
     /// For a rig at rest in `cage` (C₀, `#C by 3`).
     pub(super) fn new(cage: &[Point]) -> Self {
-        Self { drag: Drag::new(cage), ..Self::default() }
+        Self { kept: Kept::new(cage), ..Self::default() }
     }
 }
 
@@ -36,9 +36,10 @@ impl CoupledRig {
         if self.stale.rest_skin {
             let Self { binding, rest_cage, ground, buffers, rest_skin, .. } = self;
             let pass =
-                binding.rest_skin.write(rest_cage, &ground.confines(binding), &mut buffers.drag, rest_skin);
+                binding.rest_skin.write(rest_cage, &ground.confines(binding), &mut buffers.kept, rest_skin);
             self.work.rest_passes += 1;
             self.work.rest_column_passes += usize::from(pass == Pass::Columns);
+            self.work.rest_shape_passes += usize::from(pass == Pass::Shapes);
             self.stale.rest_skin = false;
         }
         &self.rest_skin
@@ -72,6 +73,7 @@ impl CoupledRig {
             let pass = centers.update(&self.rest_cage, &self.ground.confines(&self.binding));
             self.work.center_passes += usize::from(pass.is_some());
             self.work.center_column_passes += usize::from(pass == Some(Pass::Columns));
+            self.work.center_shape_passes += usize::from(pass == Some(Pass::Shapes));
             centers.centers()
         });
         let (path, weights) = (self.binding.path, &self.binding.frame_weights);

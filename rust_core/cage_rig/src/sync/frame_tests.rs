@@ -8,14 +8,19 @@ use crate::skinning::METHODS;
 use crate::sync::CoupledRig;
 
 /// Relative to the size.
-const FRAME: f64 = 1e-6;
+pub(super) const FRAME: f64 = 1e-6;
 
-fn character() -> Fixture {
+pub(super) fn character() -> Fixture {
     random::rig(random::Recipe { skin_vertices: 300, joints: 6, cage_level: 1, seed: 21 })
 }
 
 /// M₀ + m Φ (C − C₀) + offsets in double precision.
-fn exact(fixture: &Fixture, rig: &CoupledRig, mask: Option<&[f32]>, offsets: Option<&[Point]>) -> Vec<Point> {
+pub(super) fn exact(
+    fixture: &Fixture,
+    rig: &CoupledRig,
+    mask: Option<&[f32]>,
+    offsets: Option<&[Point]>,
+) -> Vec<Point> {
     let moved: Vec<Point> = rig.rest_cage().iter().zip(&fixture.cage).map(|(c, c0)| c - c0).collect();
     let steps = rig.cage_coords().times(&moved);
     let part = |i: usize| mask.map_or(1.0, |mask| f64::from(mask[i]));
@@ -23,7 +28,12 @@ fn exact(fixture: &Fixture, rig: &CoupledRig, mask: Option<&[f32]>, offsets: Opt
     (0..steps.len()).map(|i| fixture.skin[i] + part(i) * steps[i] + offset(i)).collect()
 }
 
-fn assert_near(fixture: &Fixture, rig: &mut CoupledRig, mask: Option<&[f32]>, offsets: Option<&[Point]>) {
+pub(super) fn assert_near(
+    fixture: &Fixture,
+    rig: &mut CoupledRig,
+    mask: Option<&[f32]>,
+    offsets: Option<&[Point]>,
+) {
     let expected = exact(fixture, rig, mask, offsets);
     let apart = fixtures::distance(&fixtures::points(rig.rest_skin()), &expected);
     assert!(apart <= FRAME * fixture.size(), "{apart:e}");

@@ -23,10 +23,12 @@ pub mod joint_coordinates;
 mod low_rank;
 pub mod max_entropy;
 pub mod maxvol;
+mod passes;
 pub mod reach;
 pub mod rest_centers;
 pub mod rest_skin;
 mod reverse;
+mod shapes;
 pub mod skeleton_updater;
 pub mod stages;
 mod work;
@@ -35,6 +37,8 @@ mod work;
 mod frame_tests;
 #[cfg(test)]
 mod naive;
+#[cfg(test)]
+mod shape_tests;
 #[cfg(test)]
 mod tests;
 
@@ -206,7 +210,7 @@ impl CoupledRig {
         }
         if self.ground.set_mask(&self.binding, mask) {
             self.reverser = None;
-            self.buffers.drag.forget();
+            self.buffers.kept.forget();
             self.centers.iter_mut().for_each(RestCenters::forget);
             self.rest_skin_changed();
             self.refit();
@@ -244,7 +248,7 @@ impl CoupledRig {
         if precision != self.precision() {
             Arc::make_mut(&mut self.binding).repack(precision);
             self.centers.iter_mut().for_each(|centers| centers.repack(precision));
-            self.buffers.drag.forget();
+            self.buffers.kept.forget();
             self.rest_skin_changed();
         }
     }

@@ -3,7 +3,7 @@
 //! [CTL*20] Eq. (14), p = Λ C. The same product as Eq. (7) with Λ for Φ, so in the same delta form:
 //! p = p₀ + Λ (C − C₀), in single precision. Where the cage reaches the whole skin, p₀ = Λ C₀.
 
-use super::drag::{Drag, Pass};
+use super::passes::{Kept, Pass};
 use super::rest_skin::{Confines, RestSkin};
 use crate::panels::Precision;
 use crate::points::Point;
@@ -16,7 +16,7 @@ pub struct RestCenters {
     coords: Rows,
     mover: RestSkin,
     centers: Vec<[f32; 3]>,
-    drag: Drag,
+    kept: Kept,
     stale: bool,
 }
 
@@ -30,7 +30,7 @@ impl RestCenters {
         part: &Part,
     ) -> Result<Self, Cancelled> {
         let mover = RestSkin::new(at_bind, cage, &coords, precision, part)?;
-        Ok(Self { coords, centers: mover.at_bind(), mover, drag: Drag::new(cage), stale: true })
+        Ok(Self { coords, centers: mover.at_bind(), mover, kept: Kept::new(cage), stale: true })
     }
 
     pub(super) fn mover(&self) -> &RestSkin {
@@ -58,14 +58,14 @@ impl RestCenters {
     /// What confines the rest skin has changed.
     pub fn forget(&mut self) {
         self.stale = true;
-        self.drag.forget();
+        self.kept.forget();
     }
 
     /// Makes the centers those of `cage` (C, `#C by 3`); the pass that this took, if any. A center takes
     /// part in what confines or offsets its vertex.
     pub fn update(&mut self, cage: &[Point], confines: &Confines) -> Option<Pass> {
         let due = std::mem::take(&mut self.stale);
-        due.then(|| self.mover.write(cage, confines, &mut self.drag, &mut self.centers))
+        due.then(|| self.mover.write(cage, confines, &mut self.kept, &mut self.centers))
     }
 
     /// p, `#M by 3`, as of the last update.

@@ -3,9 +3,9 @@
 //! [CTL*20] Eq. (7), M = Φ C, in delta form: M = M₀ + Φ (C − C₀). Exact at rest whatever rounding
 //! is in Φ, and only the columns of cage vertices that moved cost anything: `#M` per moved vertex.
 
-use super::drag::{Columns, Drag, Pass};
+use super::passes::{Kept, Pass};
 use crate::panels::{Apart, Panels, Precision, Product, Step, Steps, FRAMES};
-use crate::points::{to_f32, to_single, Point};
+use crate::points::{bounding_diagonal, to_f32, to_single, Point};
 use crate::progress::{unwatched, Cancelled, Part};
 use crate::rows::Rows;
 use crate::simd::Path;
@@ -15,6 +15,7 @@ use crate::simd::Path;
 pub struct RestSkin {
     skin: Apart,
     cage: Vec<Point>,
+    cage_size: f64,
     coords: Panels,
 }
 
@@ -40,7 +41,8 @@ impl RestSkin {
         part: &Part,
     ) -> Result<Self, Cancelled> {
         let coords = Panels::new(cage_coords, precision, part)?;
-        Ok(Self { skin: Apart::new(&to_f32(skin)), cage: cage.to_vec(), coords })
+        let cage_size = bounding_diagonal(cage);
+        Ok(Self { skin: Apart::new(&to_f32(skin)), cage: cage.to_vec(), cage_size, coords })
     }
 
     pub(super) fn precision(&self) -> Precision {
@@ -61,21 +63,33 @@ impl RestSkin {
         &self.coords
     }
 
-    /// Writes M for `cage` (C, `#C by 3`) over `rest`, the result of the last pass of `drag`.
-    pub fn write(&self, cage: &[Point], confines: &Confines, drag: &mut Drag, rest: &mut [[f32; 3]]) -> Pass {
-        let Confines { path, mask, offsets } = *confines;
-        let pass = match drag.to(cage, self, confines, rest) {
-            Some(Columns { panels, steps, from }) => {
-                panels.write(&Product { path, from, mask, offsets }, steps, rest);
-                Pass::Columns
-            }
-            None => {
-                self.write_whole(cage, confines, &mut drag.steps, rest);
-                Pass::Whole
-            }
-        };
-        drag.done(cage, pass, confines);
-        pass
+    /// M₀, to add to.
+    pub(super) fn points(&self) -> &Apart {
+        &self.skin
+    }
+
+    /// C₀, `#C by 3`.
+    pub(super) fn cage(&self) -> &[Point] {
+        &self.cage
+    }
+
+    /// The diagonal of its box.
+    pub(super) fn cage_size(&self) -> f64 {
+        self.cage_size
+    }
+
+    /// Writes M for `cage` (C, `#C by 3`) over `rest`, the result of the last pass with `kept`.
+    pub fn write(&self, cage: &[Point], confines: &Confines, kept: &mut Kept, rest: &mut [[f32; 3]]) -> Pass {
+        kept.pass(self, cage, confines, rest)
+    }
+
+    /// Φ times a movement of the cage (`by`, `#C by 3`).
+    pub(super) fn moves(&self, by: &[Point], path: Path, steps: &mut Steps) -> Apart {
+        let mut moves = vec![[0.0; 3]; self.skin.len()];
+        let from = &Apart::new(&moves);
+        steps.set(by.iter().enumerate().map(|(column, by)| Step { column, by: [to_single(by)] }));
+        self.coords.write(&Product { path, from, mask: None, offsets: None }, steps, &mut moves);
+        Apart::new(&moves)
     }
 
     /// Writes M for `cage` from all columns that are not as bound.

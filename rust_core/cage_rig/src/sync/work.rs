@@ -15,6 +15,8 @@ pub struct Work {
     pub rest_passes: usize,
     /// Those of them that read the columns of few cage vertices alone.
     pub rest_column_passes: usize,
+    /// Those of them that read shapes of the cage instead.
+    pub rest_shape_passes: usize,
     /// Skinnings of the whole skin.
     pub skin_passes: usize,
     /// Evaluations of Eq. (8).
@@ -25,6 +27,8 @@ pub struct Work {
     pub center_passes: usize,
     /// Those of them that read the columns of few cage vertices alone.
     pub center_column_passes: usize,
+    /// Those of them that read shapes of the cage instead.
+    pub center_shape_passes: usize,
 }
 
 /// Which of the large arrays are due.
