@@ -14,7 +14,7 @@ use crate::threads;
 /// Vertices of a block.
 const BLOCK: usize = 32;
 /// Below this many vertices one thread is faster than two; each further one needs as many.
-const PARALLEL_FROM: usize = 8192;
+const PARALLEL_FROM: usize = 16_384;
 /// Vertices that one thread takes at a time.
 const SHARE: usize = 1024;
 
