@@ -5,6 +5,7 @@
     blender --command cage_rig bake walk.blend --to usd --frames 1-48 --out baked
     blender --command cage_rig compare walk.blend walk.golden.npz
     blender --command cage_rig generate-cage hero.blend --out hero_caged.blend
+    blender --command cage_rig fit-cage hero.blend --cage Rough --out hero_caged.blend
 
 Where Blender is the bpy module: `python -m cage_rig …`, from the folder that the extension was installed into.
 """
@@ -18,7 +19,7 @@ from pathlib import Path
 
 import bpy
 
-from . import baking, check, compare, generate, merge
+from . import baking, check, compare, fit, generate, merge
 from .run import ANSWER_NO, FINE, REFUSED, Refusal, Voice
 
 NAME = "cage_rig"
@@ -33,12 +34,12 @@ def parser() -> argparse.ArgumentParser:
     """All arguments."""
     top = argparse.ArgumentParser(
         prog=f"blender --command {NAME}",
-        description="Check, bake and compare rigs of Cage Rig, and generate cages, without a window.",
+        description="Check, bake and compare rigs of Cage Rig, and generate or fit cages, without a window.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = top.add_subparsers(metavar="COMMAND", required=True)
-    for module in (check, baking, compare, merge, generate):
+    for module in (check, baking, compare, merge, generate, fit):
         one = commands.add_parser(
             module.NAME,
             help=module.HELP,
