@@ -18,9 +18,10 @@ from .session import Playback
 Live = Sequence[tuple[int, bpy.types.Object, skins.Place]]  # skins, by their numbers, and where they are
 
 
-def play(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph, *, waits: bool) -> None:
-    """Cage, bones and settings as `depsgraph` has them, into the rig and from there into what shows it. `waits`: for a
-    method that is being prepared.
+def play(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph, *, lasts: bool) -> None:
+    """Cage, bones and settings as `depsgraph` has them, into the rig and from there into what shows it. `lasts`: what
+    is shown is rendered or baked, so it waits for a method that is being prepared, and is the same in whatever order
+    frames come.
     """
     settings, session = cage.cage_rig, running.session
     shown, bones = cage.evaluated_get(depsgraph), settings.armature.evaluated_get(depsgraph)
@@ -32,9 +33,11 @@ def play(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgrap
     method = look.method.lower()
     if choosing.is_due(session, method):
         later = choosing.is_by_hand(cage) or choosing.progress(cage) is not None
-        choosing.use(cage, session, method, later=later and not waits)
+        choosing.use(cage, session, method, later=later and not lasts)
     if settings.half_weights != session.half_weights:
         session.keep_half_weights(settings.half_weights)
+    if lasts != session.reproducible:
+        session.make_reproducible(lasts)
     playback = running.playback
     if playback is None:
         playback = running.playback = Playback(session, running.bones.core, running.refit_bones)

@@ -110,6 +110,7 @@ class Session:
         self.influence = 1.0
         self.method = str(self.rig.method)  # how bones deform the skin
         self.half_weights = False  # the cage's weights are kept in 16 bits
+        self.reproducible = False  # frames are the same whatever was before them
         self.revision = 0  # grows whenever a result may have changed
         self.points = np.empty((self.starts[-1], 3), np.float32)  # of all skins
         self.shown = -1  # revision of all that `points` has, where a frame was played into it
@@ -172,6 +173,13 @@ class Session:
         """Keep the cage's weights in 16 bits, or not; free where it is so already."""
         if half != self.half_weights:
             self.rig.half_weights = self.half_weights = half
+            self.revision += 1
+
+    @_door
+    def make_reproducible(self, reproducible: bool) -> None:
+        """Make frames that do not depend on those before them, or such as are fast; free where it is so already."""
+        if reproducible != self.reproducible:
+            self.rig.reproducible = self.reproducible = reproducible
             self.revision += 1
 
     @_door

@@ -34,6 +34,7 @@ _running: dict[int, Running] = {}
 _busy = False
 _restoring = False
 _rendering = False
+_baking = False
 _again: set[registry.Key] = set()  # rest cages whose rigs need one more update
 _stale: set[registry.Key] = set()  # rest cages whose posed cages are hidden and not fitted
 
@@ -87,6 +88,17 @@ def rendering(under_way: bool) -> None:
     global _rendering
     _rendering = under_way
     _again.clear()
+
+
+def baking(under_way: bool) -> None:
+    """A bake begins or ends: what is played meanwhile goes into files."""
+    global _baking
+    _baking = under_way
+
+
+def _lasts(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether what is shown in `depsgraph` is rendered or baked."""
+    return _rendering or _baking or depsgraph.mode != "VIEWPORT"
 
 
 def restoring() -> None:
@@ -183,7 +195,7 @@ def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event
 def _play_on(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Depsgraph) -> None:
     """The next frame of a rig that is as it was."""
     was_stale = running.stale
-    playing.play(cage, running, depsgraph, waits=_rendering or depsgraph.mode != "VIEWPORT")
+    playing.play(cage, running, depsgraph, lasts=_lasts(depsgraph))
     if running.stale != was_stale:
         _note_stale(cage, running)
     if cage.cage_rig.message:
@@ -243,9 +255,10 @@ def _advance(cage: bpy.types.Object, running: Running, depsgraph: bpy.types.Deps
     shown = cage.evaluated_get(depsgraph).cage_rig  # both may be animated
     influence = float(shown.influence)
     later = event is Event.RESTORED or choosing.is_by_hand(cage) or choosing.progress(cage) is not None
-    later &= depsgraph.mode == "VIEWPORT" and not _rendering
+    later &= not _lasts(depsgraph)
     choosing.use(cage, session, shown.method.lower(), later=later)
     session.keep_half_weights(settings.half_weights)
+    session.make_reproducible(_lasts(depsgraph))
     rest = _read_rest_cage(cage, running, depsgraph)
     rest_changed = running.take_rest(rest)
     posed = _read_posed_cage(settings.posed_cage)

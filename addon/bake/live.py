@@ -119,10 +119,12 @@ def playing(cage: bpy.types.Object, first: float) -> Iterator[Callable[[float], 
     objects = [skin.obj for skin in skins_of(cage)]
     participants = [*objects, *rigs(cage), cage.cage_rig.armature]
     with shown(objects):
+        sync.baking(True)
         try:
             go(first)  # what modifiers before ours do can be read from the second time on
             yield go
         finally:
+            sync.baking(False)
             scene.frame_set(frame, subframe=subframe)
 
 

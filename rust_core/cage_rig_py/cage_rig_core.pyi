@@ -177,6 +177,10 @@ class CoupledRig:
     def half_weights(self) -> bool: ...  # whether frames keep weights of the cage in 16 bits; set at any time
     @half_weights.setter
     def half_weights(self, half: bool) -> None: ...
+    @property
+    def reproducible(self) -> bool: ...  # frames are the same bit for bit whatever was before them; set at any time
+    @reproducible.setter
+    def reproducible(self, reproducible: bool) -> None: ...
     def posed_skins(
         self,
         cages: ArrayLike,  # (#F, #C, 3), or (#C, 3) for a still cage

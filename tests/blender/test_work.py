@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import FrameType
 
 import bpy
 import numpy as np
 import pytest
 from scene import Rig, rest, select, shown, update
+from test_sync import key_the_bar
 
 
 def key_pose(rig: Rig) -> None:
@@ -60,6 +62,32 @@ def test_a_pose_reads_no_coordinates_and_a_frame_skins_once(bar: Rig) -> None:
     assert after["rest_passes"] == before["rest_passes"]
     assert after["skin_passes"] == before["skin_passes"] + 5
     assert after["cage_fits"] == before["cage_fits"] + 5
+
+
+def test_a_cage_between_its_keys_is_read_as_shapes_in_playback_and_as_a_whole_in_bakes(
+    bar: Rig, tmp_path: Path
+) -> None:
+    import bl_ext.user_default.cage_rig.bake as bake
+
+    key_the_bar(bar)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 24
+
+    def shapes_of_a_round() -> tuple[int, int]:
+        before = core_work(bar)
+        for frame in range(1, 25):
+            scene.frame_set(frame)
+        after = core_work(bar)
+        return tuple(after[name] - before[name] for name in ("rest_passes", "rest_shape_passes"))
+
+    passes, shapes = shapes_of_a_round()
+    assert shapes >= 12 and passes - shapes <= 8
+    before = core_work(bar)
+    bake.to_mesh_cache(bar.cage, str(tmp_path / "bar.pc2"), result=False)
+    after = core_work(bar)
+    assert after["rest_passes"] - before["rest_passes"] >= 15
+    assert after["rest_shape_passes"] == before["rest_shape_passes"]
+    assert shapes_of_a_round()[1] >= 12
 
 
 def test_frames_are_not_looked_at_closely_and_edits_are(bar: Rig, looks: list[str]) -> None:

@@ -196,6 +196,17 @@ impl CoupledRig {
         self.with(py, |rig| rig.set_precision(precision(half)))
     }
 
+    /// Whether frames are the same bit for bit whatever was before them, or as fast as can be.
+    #[getter]
+    fn reproducible(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |rig| rig.is_reproducible())
+    }
+
+    #[setter]
+    fn set_reproducible(&self, py: Python<'_>, reproducible: bool) -> PyResult<()> {
+        self.with(py, |rig| rig.set_reproducible(reproducible))
+    }
+
     /// Begins to change the method; the rig keeps the one that it has until the job's result() is called.
     fn start_method(&self, py: Python<'_>, name: &str) -> PyResult<MethodJob> {
         MethodJob::start(py, self, cage_rig::skinning::method(name).or_raise()?)

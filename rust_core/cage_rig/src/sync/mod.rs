@@ -79,6 +79,7 @@ impl DueCenters {
 pub struct CoupledRig {
     binding: Arc<Binding>,
     method: &'static SkinningMethod,
+    reproducible: bool,
     centers: Option<RestCenters>,
     rest_cage: Vec<Point>,
     motions: Vec<JointMotion>,
@@ -127,6 +128,7 @@ impl CoupledRig {
             reverser: None,
             work: Work { anchor_factorisations: 1, ..Work::default() },
             method,
+            reproducible: false,
             binding: Arc::new(binding),
         };
         if let Some(due) = rig.due_centers(method) {
@@ -253,6 +255,22 @@ impl CoupledRig {
         }
     }
 
+    /// Whether frames are to be the same bit for bit whatever was played and edited before them, as files need them,
+    /// or as fast as can be: what was before saves most of the product with Φ, and is good to rounding.
+    pub fn set_reproducible(&mut self, reproducible: bool) {
+        if reproducible != self.reproducible {
+            self.reproducible = reproducible;
+            self.buffers.kept.set_whole(reproducible);
+            self.centers.iter_mut().for_each(|centers| centers.set_reproducible(reproducible));
+            self.rest_skin_changed();
+        }
+    }
+
+    /// Whether frames are the same whatever was before them.
+    pub fn is_reproducible(&self) -> bool {
+        self.reproducible
+    }
+
     /// How frames keep Φ and Λ.
     pub fn precision(&self) -> Precision {
         self.binding.rest_skin.precision()
@@ -269,6 +287,9 @@ impl CoupledRig {
         if self.centers.is_none() {
             // It may have changed since they were due.
             centers.repack(self.precision());
+            if self.reproducible {
+                centers.set_reproducible(true);
+            }
             self.centers = Some(centers);
             self.work.center_integrations += 1;
         }

@@ -28,6 +28,8 @@ pub(super) struct Columns<'a> {
 pub struct Kept {
     drag: Drag,
     shapes: Shapes,
+    /// Every pass is made from all of Φ.
+    whole: bool,
     /// Of the present pass.
     pub(super) steps: Steps,
 }
@@ -35,13 +37,19 @@ pub struct Kept {
 impl Kept {
     /// Of a skin that rests in `cage` (C₀, `#C by 3`).
     pub fn new(cage: &[Point]) -> Self {
-        Self { drag: Drag::new(cage), shapes: Shapes::new(cage.len()), steps: Steps::default() }
+        Self { drag: Drag::new(cage), shapes: Shapes::new(cage.len()), ..Self::default() }
     }
 
     /// What the kept skin was made under has changed: all is forgotten but the memory.
     pub fn forget(&mut self) {
         self.drag.forget();
         self.shapes.forget();
+    }
+
+    /// From now on passes depend on nothing that was before them, or are as fast as can be.
+    pub(super) fn set_whole(&mut self, whole: bool) {
+        self.whole = whole;
+        self.forget();
     }
 
     /// Writes M of `skin` for `cage` over `rest`, which the last pass wrote.
@@ -52,9 +60,12 @@ impl Kept {
         confines: &Confines,
         rest: &mut [[f32; 3]],
     ) -> Pass {
-        let Self { drag, shapes, steps } = self;
-        let mut found = drag.to(cage, skin, confines, rest, steps).map(|columns| (columns, Pass::Columns));
-        if found.is_none() {
+        let Self { drag, shapes, whole, steps } = self;
+        let mut found = None;
+        if !*whole {
+            found = drag.to(cage, skin, confines, rest, steps).map(|columns| (columns, Pass::Columns));
+        }
+        if found.is_none() && !*whole {
             found = shapes.to(cage, skin, confines.path, steps).map(|columns| (columns, Pass::Shapes));
         }
         let pass = match found {

@@ -55,6 +55,12 @@ impl RestCenters {
         self.stale = true;
     }
 
+    /// Whether centers depend on nothing that was before them.
+    pub(super) fn set_reproducible(&mut self, reproducible: bool) {
+        self.stale = true;
+        self.kept.set_whole(reproducible);
+    }
+
     /// What confines the rest skin has changed.
     pub fn forget(&mut self) {
         self.stale = true;

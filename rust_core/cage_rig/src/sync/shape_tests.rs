@@ -159,3 +159,37 @@ fn centers_and_16_bits_follow_shapes() {
         assert!(work.rest_shape_passes >= 15 && work.center_shape_passes >= 15, "{work:?}");
     }
 }
+
+#[test]
+fn frames_can_be_the_same_whatever_was_before_them() {
+    let fixture = character();
+    let (keys, pose) = (keyed(&fixture, 3), fixtures::lively_pose(&fixture, 0.5));
+    let cage = between(&keys[1], &keys[2], 0.37);
+    for method in METHODS {
+        let mut fresh = fixture.rig();
+        fresh.set_method(method);
+        fresh.play(&cage, &pose, None).expect("a valid frame");
+        let mut rig = fixture.rig();
+        rig.set_method(method);
+        play(&fixture, &mut rig, &keys, 12);
+        rig.play(&cage, &pose, None).expect("a valid frame");
+        rig.posed_skin();
+        let shapes = rig.work().rest_shape_passes;
+        rig.set_reproducible(true);
+        for other in [0.9, 0.37, 0.36, 0.37] {
+            rig.play(&between(&keys[1], &keys[2], other), &pose, None).expect("a valid frame");
+            if other == 0.37 {
+                assert!(rig.posed_skin() == fresh.posed_skin(), "{}", method.name);
+            }
+            let mut dragged = rig.rest_cage().to_vec();
+            dragged[2].x += 0.01;
+            rig.play(&dragged, &pose, None).expect("a valid frame");
+            rig.posed_skin();
+        }
+        let work = rig.work();
+        assert_eq!((work.rest_shape_passes, work.rest_column_passes), (shapes, 0));
+        rig.set_reproducible(false);
+        play(&fixture, &mut rig, &keys, 12);
+        assert!(rig.work().rest_shape_passes > shapes);
+    }
+}
