@@ -149,46 +149,23 @@ impl Generator {
         sections: &[Section],
     ) -> Result<(Axis, Vec<usize>), CagingError> {
         let centers: Vec<Point> = sections.iter().map(|section| section.center).collect();
-        let Axis { mut points, edges: mut left } = Axis::along(&self.skeleton, nodes, &centers);
-        let whole: f64 = left.iter().map(|(a, b)| (points[*a] - points[*b]).norm()).sum();
-        let room = Room::new(pattern);
-        let mut inside: Vec<bool> = Vec::new();
-        for p in &mut points {
-            let entered = room.enter(*p);
-            inside.push(entered.is_some());
-            *p = entered.unwrap_or(*p);
-        }
-        let mut edges = Vec::new();
-        let own = points.len();
-        while let Some((a, b)) = left.pop() {
-            let (p, q) = (points[a], points[b]);
-            if inside[a] && inside[b] && room.is_clear(&p, &q) {
-                edges.push((a, b));
-            } else if let Some(middle) = room.enter((p + q) * 0.5).filter(|_| points.len() < own + BENDS) {
-                let halves = [(p - middle).norm(), (q - middle).norm()];
-                if halves.into_iter().all(|half| half < 0.99 * (q - p).norm()) {
-                    left.extend([(a, points.len()), (points.len(), b)]);
-                    points.push(middle);
-                    inside.push(true);
-                }
-            }
-        }
-        room.straighten(&points, &mut edges, own);
-        let part = largest_part(points.len(), &edges);
+        let along = Axis::along(&self.skeleton, nodes, &centers);
+        let whole = along.length();
+        let mut axis = Room::new(pattern).draw_in(along);
+        let part = largest_part(axis.points.len(), &axis.edges);
         let kept: Vec<usize> = (0..nodes.len()).filter(|node| part[*node]).collect();
-        edges.retain(|(a, _)| part[*a]);
-        let held: f64 = edges.iter().map(|(a, b)| (points[*a] - points[*b]).norm()).sum();
-        if held < LEAST * whole || kept.len() < 2 {
+        axis.edges.retain(|(a, _)| part[*a]);
+        if axis.length() < LEAST * whole || kept.len() < 2 {
             let outside = (0..nodes.len()).find(|node| !part[*node]).unwrap_or(0);
             let place = self.skin.space.leave(&nodes[outside].point);
             return Err(CagingError::RoughMisses { node: nodes[outside].node, place });
         }
-        let order: Vec<usize> =
-            kept.iter().copied().chain((nodes.len()..points.len()).filter(|at| part[*at])).collect();
-        let mut number = vec![usize::MAX; points.len()];
+        let bends = (nodes.len()..axis.points.len()).filter(|at| part[*at]);
+        let order: Vec<usize> = kept.iter().copied().chain(bends).collect();
+        let mut number = vec![usize::MAX; axis.points.len()];
         order.iter().enumerate().for_each(|(new, old)| number[*old] = new);
-        let points = order.iter().map(|at| points[*at]).collect();
-        let edges = edges.into_iter().map(|(a, b)| (number[a], number[b])).collect();
+        let points = order.iter().map(|at| axis.points[*at]).collect();
+        let edges = axis.edges.into_iter().map(|(a, b)| (number[a], number[b])).collect();
         Ok((Axis { points, edges }, kept))
     }
 }
@@ -225,6 +202,34 @@ impl<'a> Room<'a> {
         let [tree, folded] =
             [pattern.triangles(), split_otherwise(&pattern.quads())].map(|t| Bvh::new(vertices, &t));
         Self { vertices, tree, folded }
+    }
+
+    /// An axis inside, bent where it has to be, and without the edges that find no way.
+    fn draw_in(&self, axis: Axis) -> Axis {
+        let Axis { mut points, edges: mut left } = axis;
+        let mut inside: Vec<bool> = Vec::new();
+        for p in &mut points {
+            let entered = self.enter(*p);
+            inside.push(entered.is_some());
+            *p = entered.unwrap_or(*p);
+        }
+        let mut edges = Vec::new();
+        let own = points.len();
+        while let Some((a, b)) = left.pop() {
+            let (p, q) = (points[a], points[b]);
+            if inside[a] && inside[b] && self.is_clear(&p, &q) {
+                edges.push((a, b));
+            } else if let Some(middle) = self.enter((p + q) * 0.5).filter(|_| points.len() < own + BENDS) {
+                let halves = [(p - middle).norm(), (q - middle).norm()];
+                if halves.into_iter().all(|half| half < 0.99 * (q - p).norm()) {
+                    left.extend([(a, points.len()), (points.len(), b)]);
+                    points.push(middle);
+                    inside.push(true);
+                }
+            }
+        }
+        self.straighten(&points, &mut edges, own);
+        Axis { points, edges }
     }
 
     /// Distance to the faces, negative outside.

@@ -148,6 +148,11 @@ impl Course {
 }
 
 impl Axis {
+    /// Of all edges.
+    pub(crate) fn length(&self) -> f64 {
+        self.edges.iter().map(|(a, b)| (self.points[*a] - self.points[*b]).norm()).sum()
+    }
+
     /// Through the centers of sections and the branching nodes themselves.
     pub(crate) fn along(skeleton: &CurveSkeleton, nodes: &[ControlNode], centers: &[Point]) -> Self {
         let course = Course::new(skeleton, nodes);
