@@ -28,12 +28,17 @@ class Row:
     limit: float | None = None  # part of the measured memory bandwidth that was reached
 
 
-def least(*acts: Callable[[], object], rounds: int = 15, turn: int = 1) -> list[float]:
-    """The least time of each act in milliseconds, taking turns of so many, after one turn to warm up."""
+def least(
+    *acts: Callable[[], object], rounds: int = 15, turn: int = 1, before: Callable[[], object] = lambda: None
+) -> list[float]:
+    """The least time of each act in milliseconds, taking turns of so many, after one turn to warm up. What is `before`
+    every act is not timed.
+    """
     best = [float("inf")] * len(acts)
     for number in range(rounds + 1):
         for k, act in enumerate(acts):
             for _ in range(turn):
+                before()
                 start = time.perf_counter()
                 act()
                 if number:
