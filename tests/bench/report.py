@@ -63,7 +63,7 @@ def picture(rows: list[Row], path: Path) -> None:
     axes.tick_params(axis="y", labelsize=7)
     axes.set_xlabel("times faster (one process, the same meshes)")
     axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=110, bbox_inches="tight")
 
 
 def main() -> None:
