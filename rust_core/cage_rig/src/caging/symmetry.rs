@@ -27,6 +27,9 @@ pub(crate) fn is_symmetric(skin: &Skin) -> bool {
     samples.par_iter().all(near)
 }
 
+/// Of the direction of a limb at the plane, the part in x from which on it crosses the plane.
+const ACROSS: f64 = 0.7;
+
 /// How far a node of the skeleton may be from where its partner is mirrored to, relative to the size.
 const NEAR: f64 = 0.03;
 
@@ -99,7 +102,7 @@ pub(crate) fn symmetrise(
     let mut changed = sections.to_vec();
     for (i, &j) in partners.iter().enumerate() {
         if i == j {
-            let pairs = pair_up(&sections[i].corners)?;
+            let pairs = pair_up(&sections[i].corners, nodes[i].direction.x.abs() > ACROSS)?;
             for (k, &m) in pairs.iter().enumerate() {
                 mirror[i * count + k] = (i * count + m) as u32;
                 changed[i].corners[k] = (sections[i].corners[k] + image(&sections[i].corners[m])) * 0.5;
@@ -126,17 +129,19 @@ pub(crate) fn symmetrise(
     Some(mirror)
 }
 
-/// For each corner the one that its mirror image is nearest to; `None` when they don't pair up.
-fn pair_up(corners: &[Point]) -> Option<Vec<usize>> {
+/// For each corner the one that its mirror image is nearest to; `None` when they don't pair up. A section of a limb
+/// that crosses the plane (`across`) lies in it and stays as it is; that of a thin fin may seem to.
+fn pair_up(corners: &[Point], across: bool) -> Option<Vec<usize>> {
     let n = corners.len();
+    if across {
+        return Some((0..n).collect());
+    }
     // A reflection reverses the ring: corner k goes to s − k for one s.
     let cost = |s: usize| {
         (0..n).map(|k| (image(&corners[k]) - corners[(s + n - k) % n]).norm_squared()).sum::<f64>()
     };
     let flipped = (0..n).min_by(|a, b| cost(*a).total_cmp(&cost(*b)))?;
-    // A section in the plane itself stays as it is.
-    let flat: f64 = corners.iter().map(|p| 4.0 * p.x * p.x).sum();
-    Some((0..n).map(|k| if flat < cost(flipped) { k } else { (flipped + n - k) % n }).collect())
+    Some((0..n).map(|k| (flipped + n - k) % n).collect())
 }
 
 #[cfg(test)]
@@ -159,9 +164,13 @@ mod tests {
     #[test]
     fn corners_pair_up_across_the_plane_and_stay_within_it() {
         let square = [(1.0, 1.0), (-1.1, 1.0), (-1.0, -1.0), (1.0, -0.9)].map(|(x, y)| Point::new(x, y, 0.0));
-        assert_eq!(pair_up(&square), Some(vec![1, 0, 3, 2]));
+        assert_eq!(pair_up(&square, false), Some(vec![1, 0, 3, 2]));
         let within =
             [(1.0, 1.0), (-1.1, 1.0), (-1.0, -1.0), (1.0, -0.9)].map(|(y, z)| Point::new(0.01, y, z));
-        assert_eq!(pair_up(&within), Some(vec![0, 1, 2, 3]));
+        assert_eq!(pair_up(&within, true), Some(vec![0, 1, 2, 3]));
+        // Of a fin: far longer than it is thick, and its corners are not quite across from one another.
+        let fin =
+            [(-0.002, 0.0), (-0.002, 1.0), (0.002, 0.9), (0.002, 0.2)].map(|(x, y)| Point::new(x, y, 0.0));
+        assert_eq!(pair_up(&fin, false), Some(vec![3, 2, 1, 0]));
     }
 }
