@@ -15,7 +15,7 @@ import pytest
 
 from blend_fixtures import rigs, uncaged
 
-QUICK = ("human_2k_53b", "fox_576_24b", "proc_airplane", "spot_unrigged")
+QUICK = ("human_2k_53b", "fox_576_24b", "proc_airplane", "spot_unrigged", "blub_unrigged")
 LARGE_ASKED = "CAGE_RIG_LARGE_CHARACTERS"
 SHAPES = [make.__name__ for make in caged.FIXTURES]
 PLACEMENTS = pytest.mark.parametrize("placement", ["AUTOMATIC", "JOINTS"])
