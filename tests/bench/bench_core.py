@@ -21,8 +21,8 @@ except ImportError:  # no wheel for this platform: its columns stay empty
     igl = None
 
 QUICK = "--quick" in sys.argv
-# Vertices, bones and cage vertices of the rigs in [CTL*20] Table 1.
 FREE = 7  # cages that no few shapes make up
+# Vertices, bones and cage vertices of the rigs in [CTL*20] Table 1.
 PRODUCTS = ((2_089, 24, 80), (7_512, 64, 86), (41_425, 19, 68), (120_066, 98, 44))
 
 

@@ -15,8 +15,8 @@ use crate::simd::Path;
 
 /// Shapes at most; where one more is met, all are forgotten.
 const MOST: usize = 3;
-/// No cage vertex is farther from what its cage is taken for, in parts of the cage's size: less than a
-/// frame's single precision rounds by.
+/// No cage vertex is farther from what its cage is taken for, in parts of the cage's size: a quarter of what
+/// frames may be off by, and more than single precision rounds a cage between keys by.
 const ROUNDING: f64 = 2.5e-7;
 /// A shape that was seen so much smaller than it is needed is taken anew where it does not fit.
 const FAR: f64 = 2.0;
