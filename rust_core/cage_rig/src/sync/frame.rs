@@ -35,8 +35,8 @@ impl CoupledRig {
     pub fn rest_skin(&mut self) -> &[[f32; 3]] {
         if self.stale.rest_skin {
             let Self { binding, rest_cage, ground, buffers, rest_skin, .. } = self;
-            let pass =
-                binding.rest_skin.write(rest_cage, &ground.confines(binding), &mut buffers.kept, rest_skin);
+            let confines = ground.confines(binding);
+            let pass = buffers.kept.pass(&binding.rest_skin, rest_cage, &confines, rest_skin);
             self.work.rest_passes += 1;
             self.work.rest_column_passes += usize::from(pass == Pass::Columns);
             self.work.rest_shape_passes += usize::from(pass == Pass::Shapes);

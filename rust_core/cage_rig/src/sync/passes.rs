@@ -52,7 +52,7 @@ impl Kept {
         self.forget();
     }
 
-    /// Writes M of `skin` for `cage` over `rest`, which the last pass wrote.
+    /// Writes M of `skin` (`#M by 3`) for `cage` (C, `#C by 3`) over `rest`, which the last pass wrote.
     pub(super) fn pass(
         &mut self,
         skin: &RestSkin,

@@ -71,7 +71,7 @@ impl RestCenters {
     /// part in what confines or offsets its vertex.
     pub fn update(&mut self, cage: &[Point], confines: &Confines) -> Option<Pass> {
         let due = std::mem::take(&mut self.stale);
-        due.then(|| self.mover.write(cage, confines, &mut self.kept, &mut self.centers))
+        due.then(|| self.kept.pass(&self.mover, cage, confines, &mut self.centers))
     }
 
     /// p, `#M by 3`, as of the last update.

@@ -3,7 +3,6 @@
 //! [CTL*20] Eq. (7), M = Φ C, in delta form: M = M₀ + Φ (C − C₀). Exact at rest whatever rounding
 //! is in Φ, and only the columns of cage vertices that moved cost anything: `#M` per moved vertex.
 
-use super::passes::{Kept, Pass};
 use crate::panels::{Apart, Panels, Precision, Product, Step, Steps, FRAMES};
 use crate::points::{bounding_diagonal, to_f32, to_single, Point};
 use crate::progress::{unwatched, Cancelled, Part};
@@ -76,11 +75,6 @@ impl RestSkin {
     /// The diagonal of its box.
     pub(super) fn cage_size(&self) -> f64 {
         self.cage_size
-    }
-
-    /// Writes M for `cage` (C, `#C by 3`) over `rest`, the result of the last pass with `kept`.
-    pub fn write(&self, cage: &[Point], confines: &Confines, kept: &mut Kept, rest: &mut [[f32; 3]]) -> Pass {
-        kept.pass(self, cage, confines, rest)
     }
 
     /// Φ times a movement of the cage (`by`, `#C by 3`).
