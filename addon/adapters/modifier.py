@@ -15,13 +15,27 @@ from numpy.typing import NDArray
 
 from .. import compat
 from . import positions
-from .node_group import ATTRIBUTE, INDEX, INPUT, NAME, OURS, complete, identifier, is_current, node_group
+from .node_group import (
+    ASKING,
+    ATTRIBUTE,
+    INDEX,
+    INPUT,
+    NAME,
+    OURS,
+    SOCKETS,
+    complete,
+    identifier,
+    is_current,
+    is_ours,
+    is_plain,
+    node_group,
+)
 from .positions import Points
 
 
 def ours(skin: bpy.types.Object) -> list[bpy.types.Modifier]:
     """The skin's Cage Rig modifiers."""
-    return [m for m in skin.modifiers if m.type == "NODES" and m.node_group and m.node_group.get("cage_rig")]
+    return [m for m in skin.modifiers if m.type == "NODES" and is_ours(m.node_group)]
 
 
 def is_emptied(modifier: bpy.types.Modifier) -> bool:
@@ -52,8 +66,26 @@ def set_inputs(modifier: bpy.types.Modifier, values: dict[str, Any]) -> bool:
     for name, value in changed.items():
         compat.set_modifier_input(modifier, identifier(modifier.node_group, name), value)
     if changed:
+        _choose_group(modifier)
         modifier.id_data.update_tag()
     return not changed
+
+
+def _asks(modifier: bpy.types.Modifier) -> bool:
+    """Whether more is asked of the modifier than to place vertices where an attribute says."""
+    return any(read(modifier, name) for name in ASKING)
+
+
+def _choose_group(modifier: bpy.types.Modifier) -> None:
+    """Let a plain group do where it can. One of another file stays while it serves."""
+    plain, group = not _asks(modifier), modifier.node_group
+    if is_plain(group) == plain or not is_current(group) or (plain and group.library is not None):
+        return
+    values = {name: read(modifier, name) for name in SOCKETS}
+    modifier.node_group = node_group(plain=plain)
+    for name, value in values.items():
+        if value is not None:
+            compat.set_modifier_input(modifier, identifier(modifier.node_group, name), value)
 
 
 def add(skin: bpy.types.Object, posed_cage: bpy.types.Object, index: int) -> None:
@@ -80,8 +112,9 @@ def renew(skin: bpy.types.Object) -> None:
     for modifier in ours(skin):
         group = modifier.node_group
         if group.library is None and group.override_library is None and not is_current(group):
-            complete(group)
+            complete(group, plain=not _asks(modifier))
             modifier.show_in_editmode = False
+        _choose_group(modifier)
 
 
 def is_whole(skin: bpy.types.Object) -> bool:
@@ -189,17 +222,18 @@ def remove(skin: bpy.types.Object, cage: bpy.types.Object | None, *, removing: b
     """
     for modifier in ours(skin):
         if cage is None or cage_of(modifier) in (cage, None):
-            group, feed = modifier.node_group, read(modifier, "Feed")
+            feed = read(modifier, "Feed")
             set_inputs(modifier, {"Feed": None})  # or Blender 5.2 goes on counting the modifier among its users
             skin.modifiers.remove(modifier)
-            if removing and group.users == 0 and group.library is None:
-                bpy.data.node_groups.remove(group)
             if removing and feed is not None and feed.users == 0 and feed.library is None:
                 bpy.data.meshes.remove(feed.data)
     if not ours(skin) and skin.data is not None and not _is_linked(skin.data):
         # the feed, and where a modifier was applied what it kept
         for name in [found.name for found in skin.data.attributes if found.name.startswith(OURS)]:
             skin.data.attributes.remove(skin.data.attributes[name])
+    for group in [found for found in bpy.data.node_groups if is_ours(found)] if removing else []:
+        if group.users == 0 and group.library is None:
+            bpy.data.node_groups.remove(group)
 
 
 def set_shown(skin: bpy.types.Object, shown: bool) -> None:

@@ -5,6 +5,10 @@ It places vertices where the feed says: a point attribute of the mesh, or, where
 linked from another file, the vertices of a feed object. Without a feed it moves nothing. On request it keeps what it is
 given (positions, a mask) as attributes of its result, for the next update to read. It takes cages as inputs: the posed
 cage names the rig, and what is an input is evaluated, also where it is hidden.
+
+Every node, and every geometry between two, takes time in every frame, also where it does nothing. So a modifier that is
+asked for no more than to read an attribute has a plain group. That has all the inputs too, so that modifiers keep their
+values when they change from one to the other.
 """
 
 from __future__ import annotations
@@ -31,27 +35,41 @@ SOCKETS = {
     "Mask": "NodeSocketString",
     "Mask As": "NodeSocketString",
 }
+ASKING = ("Use Feed", "Keep Input", "Keep Mask")  # inputs that a plain group leaves alone
+PLAIN = "cage_rig_plain"  # what marks a plain group
 
 
-def node_group() -> bpy.types.NodeTree:
-    """The shared node group of this file, made on first use."""
+def is_ours(group: bpy.types.NodeTree | None) -> bool:
+    """Whether this is a node group of a "Cage Rig" modifier."""
+    return group is not None and bool(group.get("cage_rig"))
+
+
+def is_plain(group: bpy.types.NodeTree) -> bool:
+    """Whether a group of ours does no more than to place vertices where an attribute says."""
+    return bool(group.get(PLAIN))
+
+
+def node_group(*, plain: bool = True) -> bpy.types.NodeTree:
+    """The shared node group of this file of either kind, made on first use."""
     for group in bpy.data.node_groups:
-        if group.get("cage_rig") and group.library is None and is_current(group):
+        if is_ours(group) and group.library is None and is_plain(group) == plain and is_current(group):
             return group
-    group = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
+    group = bpy.data.node_groups.new(NAME if plain else f"{NAME} Whole", "GeometryNodeTree")
     group["cage_rig"] = True
     group.is_modifier = True
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    complete(group)
+    complete(group, plain=plain)
     return group
 
 
-def complete(group: bpy.types.NodeTree) -> None:
-    """Give a group of ours all its inputs and nodes. Those inputs that it has stay, with the values in modifiers.
+def complete(group: bpy.types.NodeTree, *, plain: bool) -> None:
+    """Give a group of ours all its inputs, and the nodes of either kind. Those inputs that it has stay, with the values
+    in modifiers.
 
     They have to: Blender crashes where a library override of a modifier finds another type behind an identifier.
     """
+    group[PLAIN] = plain
     kinds = {name: kind for name, _, kind in _inputs(group)}
     for item in list(group.interface.items_tree):
         if item.name in SOCKETS and kinds.get(item.name) != SOCKETS[item.name]:
@@ -60,7 +78,11 @@ def complete(group: bpy.types.NodeTree) -> None:
         if kinds.get(name) != kind:
             group.interface.new_socket(name, in_out="INPUT", socket_type=kind)
     group.nodes.clear()
-    _Builder(group).build()
+    builder = _Builder(group)
+    if plain:
+        builder.build_plain()
+    else:
+        builder.build()
 
 
 def is_current(group: bpy.types.NodeTree) -> bool:
@@ -104,6 +126,9 @@ class _Builder:
 
     def given(self, name: str) -> bpy.types.NodeSocket:
         return self.source.outputs[name]
+
+    def build_plain(self) -> None:
+        self.link(self.by_attribute(self.given("Geometry")), self.node("NodeGroupOutput"), "Geometry")
 
     def build(self) -> None:
         index = self.node("GeometryNodeInputIndex").outputs["Index"]

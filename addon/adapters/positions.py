@@ -84,7 +84,6 @@ def write_base(mesh: bpy.types.Mesh, points: Points) -> None:
     """Write base coordinates through the position attribute. Not in Edit Mode."""
     mesh.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(points, np.float32).reshape(-1))
     mesh.update()
-    mesh.update_tag()
 
 
 def move(mesh: bpy.types.Mesh, points: NDArray[np.floating]) -> None:

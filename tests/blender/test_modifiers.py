@@ -46,6 +46,37 @@ def test_a_lattice_before_ours_is_honoured(bar: Rig) -> None:
     assert np.abs(fresh(bar)[0] - fattened).max() < 1e-5
 
 
+def test_blender_evaluates_no_node_that_nothing_asks_for(bar: Rig) -> None:
+    """Every node of a group takes time in every frame, also where it does nothing."""
+    bend(bar, 1.0)
+    fat_key(bar)
+    before, inputs = shown(bar.skin).copy(), given(bar)
+    few = ["GeometryNodeInputNamedAttribute", "GeometryNodeStoreNamedAttribute", "NodeGroupInput", "NodeGroupOutput"]
+    assert nodes(bar) == few
+    lattice_before(bar)
+    update()
+    bend(bar, 1.0)
+    assert bar.settings.state == "LIVE", bar.settings.message
+    assert len(nodes(bar)) > len(few) and given(bar) == {**inputs, "Keep Input": True}
+    assert np.abs(shown(bar.skin) - before).max() > 0.01
+    bar.skin.modifiers.remove(bar.skin.modifiers["Squeeze"])
+    update()
+    bend(bar, 1.0)
+    assert nodes(bar) == few and given(bar) == inputs
+    assert np.abs(shown(bar.skin) - before).max() < 1e-6
+
+
+def nodes(rig: Rig) -> list[str]:
+    return sorted(node.bl_idname for node in rig.skin.modifiers["Cage Rig"].node_group.nodes)
+
+
+def given(rig: Rig) -> dict[str, object]:
+    """What the modifier's inputs are set to."""
+    from bl_ext.user_default.cage_rig.adapters import modifier, node_group
+
+    return {name: modifier.read(rig.skin.modifiers["Cage Rig"], name) or None for name in node_group.SOCKETS}
+
+
 def test_a_lattice_before_ours_at_bind() -> None:
     objects = build_bar()
     lattice_before(Rig(objects.skins, objects.armature, objects.cage))

@@ -26,7 +26,7 @@ use singles::{Single, SingleMoves};
 /// Rows of a panel.
 const PANEL: usize = 32;
 /// Below this many numbers one thread is faster than two; each further one needs as many.
-const PARALLEL_FROM: usize = 1 << 18;
+const PARALLEL_FROM: usize = 3 << 18;
 /// Panels that one thread takes at a time.
 const SHARE: usize = 16;
 /// Frames of one walk.
