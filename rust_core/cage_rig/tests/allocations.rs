@@ -58,13 +58,12 @@ fn frames_allocate_nothing_after_the_first_one() {
         assert_eq!((0..20).map(|_| region_of(&mut rig, &mut dragged)).sum::<usize>(), 0);
         let drags = rig.work().rest_column_passes;
         assert_eq!(drags, 21);
-        // Of a keyed cage the first frames keep its shape.
+        // Nor do the frames in which the shapes of a keyed cage are learnt.
         let keyed: Vec<_> = (1..=12)
             .map(|k| (nudged(&small.cage, 0.01 * f64::from(k), 1), lively_pose(&small, 0.5)))
             .collect();
-        assert!(allocations(&mut rig, &keyed) > 0);
         assert_eq!(allocations(&mut rig, &keyed), 0);
-        assert!(rig.work().rest_shape_passes >= 20, "{:?}", rig.work());
+        assert!(rig.work().rest_shape_passes >= 10, "{:?}", rig.work());
     }
     // Large enough for threads: a thread that helps is told so in a block, up to three for the product and two for
     // skinning, and the pool takes one now and then.

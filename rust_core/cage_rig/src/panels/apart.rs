@@ -28,6 +28,16 @@ impl Apart {
         }
     }
 
+    /// So many points, all of them 0.
+    pub(crate) fn zeros(count: usize) -> Self {
+        Self { count, panels: vec![[Single::ZERO; 3]; count.div_ceil(PANEL)] }
+    }
+
+    /// Lets all points be 0.
+    pub(crate) fn clear(&mut self) {
+        self.panels.fill([Single::ZERO; 3]);
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.count
     }

@@ -66,7 +66,7 @@ impl Kept {
             found = drag.to(cage, skin, confines, rest, steps).map(|columns| (columns, Pass::Columns));
         }
         if found.is_none() && !*whole {
-            found = shapes.to(cage, skin, confines.path, steps).map(|columns| (columns, Pass::Shapes));
+            found = shapes.to(cage, skin, confines.path, rest, steps).map(|columns| (columns, Pass::Shapes));
         }
         let pass = match found {
             Some((Columns { factor, from }, pass)) => {

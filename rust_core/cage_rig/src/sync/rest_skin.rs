@@ -77,13 +77,19 @@ impl RestSkin {
         self.cage_size
     }
 
-    /// Φ times a movement of the cage (`by`, `#C by 3`).
-    pub(super) fn moves(&self, by: &[Point], path: Path, steps: &mut Steps) -> Apart {
-        let mut moves = vec![[0.0; 3]; self.skin.len()];
-        let from = &Apart::new(&moves);
+    /// Leaves Φ times a movement of the cage (`by`, `#C by 3`) in `place`; `scratch` is written over (`#M by 3`).
+    pub(super) fn keep_moves(
+        &self,
+        by: &[Point],
+        path: Path,
+        steps: &mut Steps,
+        scratch: &mut [[f32; 3]],
+        place: &mut Apart,
+    ) {
+        place.clear();
         steps.set(by.iter().enumerate().map(|(column, by)| Step { column, by: [to_single(by)] }));
-        self.coords.write(&Product { path, from, mask: None, offsets: None }, steps, &mut moves);
-        Apart::new(&moves)
+        self.coords.write(&Product { path, from: place, mask: None, offsets: None }, steps, scratch);
+        place.keep(scratch);
     }
 
     /// Writes M for `cage` from all columns that are not as bound.

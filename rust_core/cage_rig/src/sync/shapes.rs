@@ -29,8 +29,9 @@ pub(super) struct Shapes {
     /// D, each orthogonal to those before it; the first `seen` of them.
     shapes: [Shape; MOST],
     seen: usize,
-    /// Φ D of the first of them.
-    made: Vec<Apart>,
+    /// Φ D of the first `made` of them; the memory for all is taken when the cage first moves.
+    moves: Vec<Apart>,
+    made: usize,
     /// What is left of the present movement.
     left: Vec<Point>,
 }
@@ -48,23 +49,27 @@ impl Shapes {
     /// Of a cage of so many vertices.
     pub(super) fn new(vertices: usize) -> Self {
         let shapes = std::array::from_fn(|_| Shape { by: Vec::with_capacity(vertices), ..Shape::default() });
-        Self { shapes, seen: 0, made: Vec::new(), left: Vec::with_capacity(vertices) }
+        Self { shapes, left: Vec::with_capacity(vertices), ..Self::default() }
     }
 
     pub(super) fn forget(&mut self) {
         self.keep(0);
     }
 
-    /// The shapes that `cage` is made up of; none where it is not.
+    /// The shapes that `cage` is made up of; none where it is not. `scratch` may be written over (`#M by 3`).
     pub(super) fn to<'a>(
         &'a mut self,
         cage: &[Point],
         skin: &'a RestSkin,
         path: Path,
+        scratch: &mut [[f32; 3]],
         steps: &mut Steps,
     ) -> Option<Columns<'a>> {
         if cage.len() < GAIN * 3 * MOST {
             return None;
+        }
+        if self.moves.is_empty() {
+            self.moves.resize_with(MOST, || Apart::zeros(scratch.len()));
         }
         let near = ROUNDING * skin.cage_size();
         self.left.clear();
@@ -75,12 +80,13 @@ impl Shapes {
             self.learn();
             return None;
         }
-        for shape in &self.shapes[self.made.len()..self.seen] {
-            self.made.push(skin.moves(&shape.by, path, steps));
+        for (shape, place) in self.shapes.iter().zip(&mut self.moves).take(self.seen).skip(self.made) {
+            skin.keep_moves(&shape.by, path, steps, scratch, place);
         }
+        self.made = self.seen;
         let parts = self.shapes[..self.seen].iter().map(|shape| shape.part).enumerate();
         steps.set(parts.filter(|(_, t)| *t != 0.0).map(|(column, t)| Step { column, by: [[t as f32; 3]] }));
-        Some(Columns { factor: Factor::Shapes(&self.made), from: skin.points() })
+        Some(Columns { factor: Factor::Shapes(&self.moves), from: skin.points() })
     }
 
     /// One more shape: what those that are kept leave of the present movement.
@@ -97,7 +103,7 @@ impl Shapes {
     /// Forgets all but the first `count`.
     fn keep(&mut self, count: usize) {
         self.seen = self.seen.min(count);
-        self.made.truncate(count);
+        self.made = self.made.min(count);
     }
 }
 
