@@ -85,7 +85,9 @@ def wait(cage: bpy.types.Object) -> None:
     for skin in skins:
         if is_own(skin):
             dependence.settle(skin, [_read_from(other) for other in _cages(skin)])
-        modifier.set_inputs(modifier.find(skin, cage), {"Rest Cage": None if is_own(skin) else cage})
+        bare = is_own(skin) and len(modifier.ours(skin)) == 1
+        inputs = {"Rest Cage": None if is_own(skin) else cage, "Posed Cage": None if bare else posed}
+        modifier.set_inputs(modifier.find(skin, cage), inputs)
     if is_own(posed):
         far = not all(is_own(skin) for skin in skins)
         dependence.settle(posed, [_read_from(cage)] if far else [], passed_on=True)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The "Cage Rig" Geometry Nodes modifiers on a skin, one for each of its rigs, and the feed.
 
-Base coordinates are never written. The posed cage, an object input, says which rig a modifier is of. Where the skin can
-keep no driver (`dependence`) the rest cage is an input too, so that Blender evaluates both for the skin.
+Base coordinates are never written. Where a skin has several, the posed cage, an object input, says of which rig each
+is. A single one does without: what is an input is evaluated before the skin, and both are written in every frame. Where
+the skin can keep no driver (`dependence`) both cages are inputs, so that Blender evaluates them for the skin.
 """
 
 from __future__ import annotations
@@ -49,9 +50,11 @@ def find(skin: bpy.types.Object, cage: bpy.types.Object) -> bpy.types.Modifier |
 
 
 def cage_of(modifier: bpy.types.Modifier) -> bpy.types.Object | None:
-    """The rest cage of the rig that the modifier is of; None where its posed cage was deleted."""
-    posed = read(modifier, "Posed Cage")
-    return read(modifier, "Rest Cage") if posed is None else posed.cage_rig.owner
+    """The rest cage of the rig that the modifier is of; None for one of several whose posed cage was deleted."""
+    skin, posed = modifier.id_data, read(modifier, "Posed Cage")
+    if posed is not None:
+        return posed.cage_rig.owner
+    return skin.cage_rig.owner if len(ours(skin)) == 1 else read(modifier, "Rest Cage")
 
 
 def read(modifier: bpy.types.Modifier, name: str) -> Any:
@@ -88,11 +91,20 @@ def _choose_group(modifier: bpy.types.Modifier) -> None:
             compat.set_modifier_input(modifier, identifier(modifier.node_group, name), value)
 
 
+def _name_rig(modifier: bpy.types.Modifier) -> None:
+    """Let a modifier that was the only one say of which rig it is."""
+    cage = cage_of(modifier)
+    if cage is not None:
+        set_inputs(modifier, {"Posed Cage": cage.cage_rig.posed_cage})
+
+
 def add(skin: bpy.types.Object, posed_cage: bpy.types.Object, index: int) -> None:
     """Add the modifier of a rig to the skin at place `index` of its stack, without a feed.
 
     It takes the place of one of ours whose node group or posed cage was deleted.
     """
+    if len(ours(skin)) == 1:
+        _name_rig(ours(skin)[0])
     nameless = [found for found in skin.modifiers if is_emptied(found) and found.name.startswith(NAME)]
     for emptied in nameless + [found for found in ours(skin) if cage_of(found) is None]:
         index -= list(skin.modifiers).index(emptied) < index

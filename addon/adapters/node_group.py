@@ -3,8 +3,8 @@
 
 It places vertices where the feed says: a point attribute of the mesh, or, where the mesh can't be written because it is
 linked from another file, the vertices of a feed object. Without a feed it moves nothing. On request it keeps what it is
-given (positions, a mask) as attributes of its result, for the next update to read. It takes cages as inputs: the posed
-cage names the rig, and what is an input is evaluated, also where it is hidden.
+given (positions, a mask) as attributes of its result, for the next update to read. It takes cages as inputs: a posed
+cage names its rig where a skin has several, and what is an input is evaluated, also where it is hidden.
 
 Every node, and every geometry between two, takes time in every frame, also where it does nothing. So a modifier that is
 asked for no more than to read an attribute has a plain group. That has all the inputs too, so that modifiers keep their

@@ -264,6 +264,43 @@ def test_layered_cages_play_hidden_render_and_reload(bar: Rig, tmp_path: Path) -
     assert_rendered(rig, shapes, tmp_path)
 
 
+def test_a_skin_waits_for_posed_cages_only_where_it_has_several(bar: Rig) -> None:
+    """What is an input of a modifier is evaluated before it. Several modifiers say by it of which rig each is."""
+    assert posed_inputs(bar.skin) == [None]
+    hand = bind_small(bar)
+    assert set(posed_inputs(bar.skin)) == {bar.posed, hand.posed}
+    fatten(hand, 1.3)
+    assert np.abs(fresh(hand)[0] - shown(bar.skin)).max() < 1e-5
+    select([bar.cage], bar.cage)
+    bpy.ops.cage_rig.unbind()
+    update()
+    assert posed_inputs(hand.skin) == [None]
+    assert hand.settings.state == "LIVE", hand.settings.message
+    fatten(hand, 0.8)
+    assert np.abs(fresh(hand)[0] - shown(hand.skin)).max() < 1e-5
+
+
+def test_a_lower_rig_comes_back_when_its_posed_cage_was_deleted(bar: Rig) -> None:
+    hand = bind_small(bar)
+    fatten(hand, 1.3)
+    before = shown(bar.skin).copy()
+    bpy.data.objects.remove(bar.posed)
+    update()
+    assert bar.settings.state == "PAUSED"
+    select([bar.cage], bar.cage)
+    assert bpy.ops.cage_rig.rebind() == {"FINISHED"}
+    update()
+    assert (bar.settings.state, hand.settings.state) == ("LIVE", "LIVE"), bar.settings.message + hand.settings.message
+    assert set(posed_inputs(bar.skin)) == {bar.posed, hand.posed} and bar.skin.cage_rig.owner == hand.cage
+    assert np.abs(shown(bar.skin) - before).max() < 1e-5
+
+
+def posed_inputs(skin: bpy.types.Object) -> list[bpy.types.Object | None]:
+    from bl_ext.user_default.cage_rig.adapters import modifier
+
+    return [modifier.read(found, "Posed Cage") for found in modifier.ours(skin)]
+
+
 def test_three_levels_act_in_order_and_come_off_in_any_order(bar: Rig) -> None:
     hand, tip = bind_small(bar), bind_small(bar, "TipCage")
     assert tip.settings.input == hand.cage and hand.settings.input == bar.cage
