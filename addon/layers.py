@@ -76,7 +76,8 @@ def _cages(obj: bpy.types.Object) -> list[bpy.types.Object]:
 
 
 def wait(cage: bpy.types.Object) -> None:
-    """Have Blender evaluate cage and bones wherever it shows a skin or the posed cage of the rig, however hidden.
+    """Have Blender evaluate cage and bones wherever it shows a skin or the posed cage of the rig, however hidden, and
+    where the posed cage is.
 
     A skin of another file keeps no driver: it depends on both cages by its modifier, and through the posed cage on the
     bones, so that it is evaluated twice a frame.
@@ -84,7 +85,9 @@ def wait(cage: bpy.types.Object) -> None:
     skins, posed = skins_of(cage), cage.cage_rig.posed_cage
     for skin in skins:
         if is_own(skin):
-            dependence.settle(skin, [_read_from(other) for other in _cages(skin)])
+            cages = _cages(skin)
+            shown = [other.cage_rig.posed_cage for other in cages]
+            dependence.settle(skin, [_read_from(other) for other in cages], places=[obj for obj in shown if obj])
         bare = is_own(skin) and len(modifier.ours(skin)) == 1
         inputs = {"Rest Cage": None if is_own(skin) else cage, "Posed Cage": None if bare else posed}
         modifier.set_inputs(modifier.find(skin, cage), inputs)

@@ -10,17 +10,29 @@ when its points are written. Where others depend on the object in turn it has to
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 PROPERTY = "empty_display_size"
 PLACE = "delta_location"
+SHAPE = "dimensions[0]"
 Rig = tuple[bpy.types.Object, bpy.types.Object, list[str]]  # rest cage, armature, names of bones
 
 
-def settle(obj: bpy.types.Object, rigs: list[Rig], *, passed_on: bool = False) -> None:
-    """Let `obj`, and what depends on its place where that is `passed_on`, wait for these rigs and no others."""
+def settle(
+    obj: bpy.types.Object,
+    rigs: list[Rig],
+    *,
+    places: Sequence[bpy.types.Object] = (),
+    passed_on: bool = False,
+) -> None:
+    """Let `obj`, and what depends on its place where that is `passed_on`, wait for these rigs, for the places of these
+    objects and for nothing else.
+    """
     found = _driver(obj, PLACE if passed_on else PROPERTY)
-    wanted = [end for cage, bones, names in rigs for end in [(cage, ""), *((bones, name) for name in names)]]
+    wanted = [end for cage, bones, names in rigs for end in [(cage, SHAPE), *((bones, name) for name in names)]]
+    wanted += [(other, "") for other in places]
     if ([] if found is None else [_end(variable) for variable in found.variables]) == wanted:
         return
     if found is not None:
@@ -29,14 +41,14 @@ def settle(obj: bpy.types.Object, rigs: list[Rig], *, passed_on: bool = False) -
         return
     driver = (obj.driver_add(PLACE, 0) if passed_on else obj.driver_add(PROPERTY)).driver
     driver.type, driver.expression = "SCRIPTED", "0.0" if passed_on else "1.0"
-    for target, bone in wanted:
+    for target, read in wanted:
         variable = driver.variables.new()
-        variable.type = "TRANSFORMS" if bone else "SINGLE_PROP"
+        variable.type = "SINGLE_PROP" if read == SHAPE else "TRANSFORMS"
         variable.targets[0].id = target
-        if bone:
-            variable.targets[0].bone_target = bone
+        if read == SHAPE:
+            variable.targets[0].data_path = SHAPE
         else:
-            variable.targets[0].data_path = "dimensions[0]"
+            variable.targets[0].bone_target = read
 
 
 def _driver(obj: bpy.types.Object, path: str) -> bpy.types.Driver | None:
@@ -46,4 +58,4 @@ def _driver(obj: bpy.types.Object, path: str) -> bpy.types.Driver | None:
 
 def _end(variable: bpy.types.DriverVariable) -> tuple[bpy.types.Object | None, str]:
     target = variable.targets[0]
-    return target.id, target.bone_target if variable.type == "TRANSFORMS" else ""
+    return target.id, target.bone_target if variable.type == "TRANSFORMS" else target.data_path
