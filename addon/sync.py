@@ -7,6 +7,8 @@ any moment; they are rebuilt from the .blend.
 
 from __future__ import annotations
 
+import threading
+
 import bpy
 
 from . import (
@@ -31,6 +33,7 @@ from .running import Event, Matrix, Points, Running
 from .session import Below, Bones, Session, SessionCrash, SessionError
 
 _running: dict[int, Running] = {}
+_turn = threading.RLock()  # a render has a thread of its own, and its frames wait for an update that is under way
 _busy = False
 _restoring = False
 _rendering = False
@@ -40,9 +43,9 @@ _stale: set[registry.Key] = set()  # rest cages whose posed cages are hidden and
 
 
 def forget() -> None:
-    """Drop every session: after loading a file, and when the add-on goes."""
+    """Drop every session: after loading a file, which ends renders, and when the add-on goes."""
+    rendering(False)
     _running.clear()
-    _again.clear()
     _stale.clear()
     choosing.forget()
     registry.forget()
@@ -108,9 +111,12 @@ def restoring() -> None:
 
 
 def restored() -> None:
-    """After undo, redo or load: read everything again."""
+    """After undo, redo, load or a render: read everything again. Not while a render lasts, whose end comes here too."""
     global _restoring
     registry.forget()
+    if _rendering:
+        _restoring = False
+        return
     depsgraph = bpy.context.evaluated_depsgraph_get()
     _restoring = False
     for cage in registry.rigs():
@@ -149,19 +155,21 @@ def session_of(cage: bpy.types.Object) -> Session:
 def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
     """Sync one rig. Never raises: a rig that can't run is paused and says why."""
     global _busy
-    if _busy:
-        return
-    _busy = True
-    try:
-        _update(cage, depsgraph, event)
-    except SessionError as error:
-        if isinstance(error, SessionCrash):
-            _running.pop(cage.session_uid, None)
-        _pause(cage, health.Problem(f"'{cage.name}': {error}", error.fix))
-    except Exception as error:  # a handler must never raise, whatever the file holds
-        _pause(cage, f"'{cage.name}' met an error in Cage Rig ({type(error).__name__}: {error}); please report it")
-    finally:
-        _busy = False
+    with _turn:
+        if _busy:
+            return  # what an update does makes Blender call us
+        _busy = True
+        try:
+            _update(cage, depsgraph, event)
+        except SessionError as error:
+            if isinstance(error, SessionCrash):
+                _running.pop(cage.session_uid, None)
+            _pause(cage, health.Problem(f"'{cage.name}': {error}", error.fix))
+        except Exception as error:  # a handler must never raise, whatever the file holds
+            name = type(error).__name__
+            _pause(cage, f"'{cage.name}' met an error in Cage Rig ({name}: {error}); please report it")
+        finally:
+            _busy = False
 
 
 def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
