@@ -51,10 +51,13 @@ def find(skin: bpy.types.Object, cage: bpy.types.Object) -> bpy.types.Modifier |
 
 def cage_of(modifier: bpy.types.Modifier) -> bpy.types.Object | None:
     """The rest cage of the rig that the modifier is of; None for one of several whose posed cage was deleted."""
-    skin, posed = modifier.id_data, read(modifier, "Posed Cage")
-    if posed is not None:
-        return posed.cage_rig.owner
-    return skin.cage_rig.owner if len(ours(skin)) == 1 else read(modifier, "Rest Cage")
+    posed, rest = read(modifier, "Posed Cage"), read(modifier, "Rest Cage")
+    if posed is not None or rest is not None:
+        return rest if posed is None else posed.cage_rig.owner
+    skin = modifier.id_data
+    named = [read(other, "Posed Cage") for other in ours(skin)]
+    owner = skin.cage_rig.owner
+    return None if owner is not None and owner.cage_rig.posed_cage in filter(None, named) else owner
 
 
 def read(modifier: bpy.types.Modifier, name: str) -> Any:
@@ -92,7 +95,7 @@ def _choose_group(modifier: bpy.types.Modifier) -> None:
 
 
 def _name_rig(modifier: bpy.types.Modifier) -> None:
-    """Let a modifier that was the only one say of which rig it is."""
+    """Let a modifier say itself of which rig it is."""
     cage = cage_of(modifier)
     if cage is not None:
         set_inputs(modifier, {"Posed Cage": cage.cage_rig.posed_cage})
@@ -103,8 +106,8 @@ def add(skin: bpy.types.Object, posed_cage: bpy.types.Object, index: int) -> Non
 
     It takes the place of one of ours whose node group or posed cage was deleted.
     """
-    if len(ours(skin)) == 1:
-        _name_rig(ours(skin)[0])
+    for other in ours(skin):
+        _name_rig(other)
     nameless = [found for found in skin.modifiers if is_emptied(found) and found.name.startswith(NAME)]
     for emptied in nameless + [found for found in ours(skin) if cage_of(found) is None]:
         index -= list(skin.modifiers).index(emptied) < index

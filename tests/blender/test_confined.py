@@ -295,6 +295,24 @@ def test_a_lower_rig_comes_back_when_its_posed_cage_was_deleted(bar: Rig) -> Non
     assert np.abs(shown(bar.skin) - before).max() < 1e-5
 
 
+def test_a_modifier_that_was_duplicated_changes_nothing(bar: Rig) -> None:
+    fat_key(bar)
+    bend(bar, 1.0)
+    before = shown(bar.skin).copy()
+    with bpy.context.temp_override(object=bar.skin, active_object=bar.skin):
+        assert bpy.ops.object.modifier_copy(modifier="Cage Rig") == {"FINISHED"}
+    update()
+    assert bar.settings.state == "LIVE", bar.settings.message
+    assert np.abs(shown(bar.skin) - before).max() < 1e-6
+    hand = bind_small(bar)
+    fatten(hand, 1.3)
+    assert np.abs(fresh(hand)[0] - shown(bar.skin)).max() < 1e-5
+    for rig in (hand, bar):
+        select([rig.cage], rig.cage)
+        bpy.ops.cage_rig.unbind()
+    assert [m.name for m in bar.skin.modifiers] == ["Armature"] and not bpy.data.node_groups
+
+
 def posed_inputs(skin: bpy.types.Object) -> list[bpy.types.Object | None]:
     from bl_ext.user_default.cage_rig.adapters import modifier
 
