@@ -7,8 +7,6 @@ any moment; they are rebuilt from the .blend.
 
 from __future__ import annotations
 
-import threading
-
 import bpy
 
 from . import (
@@ -33,7 +31,6 @@ from .running import Event, Matrix, Points, Running
 from .session import Below, Bones, Session, SessionCrash, SessionError
 
 _running: dict[int, Running] = {}
-_turn = threading.RLock()  # a render has a thread of its own, and its frames wait for an update that is under way
 _busy = False
 _restoring = False
 _rendering = False
@@ -155,21 +152,19 @@ def session_of(cage: bpy.types.Object) -> Session:
 def update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:
     """Sync one rig. Never raises: a rig that can't run is paused and says why."""
     global _busy
-    with _turn:
-        if _busy:
-            return  # what an update does makes Blender call us
-        _busy = True
-        try:
-            _update(cage, depsgraph, event)
-        except SessionError as error:
-            if isinstance(error, SessionCrash):
-                _running.pop(cage.session_uid, None)
-            _pause(cage, health.Problem(f"'{cage.name}': {error}", error.fix))
-        except Exception as error:  # a handler must never raise, whatever the file holds
-            name = type(error).__name__
-            _pause(cage, f"'{cage.name}' met an error in Cage Rig ({name}: {error}); please report it")
-        finally:
-            _busy = False
+    if _busy:
+        return
+    _busy = True
+    try:
+        _update(cage, depsgraph, event)
+    except SessionError as error:
+        if isinstance(error, SessionCrash):
+            _running.pop(cage.session_uid, None)
+        _pause(cage, health.Problem(f"'{cage.name}': {error}", error.fix))
+    except Exception as error:  # a handler must never raise, whatever the file holds
+        _pause(cage, f"'{cage.name}' met an error in Cage Rig ({type(error).__name__}: {error}); please report it")
+    finally:
+        _busy = False
 
 
 def _update(cage: bpy.types.Object, depsgraph: bpy.types.Depsgraph, event: Event) -> None:

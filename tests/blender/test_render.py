@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 from baked import bake
-from scene import Rig, bend, native, shown, unwatched, update
+from scene import Rig, bend, native, shown, update
 from test_sync import key_the_bar
 
 Picture = np.ndarray
@@ -99,24 +98,3 @@ def test_what_a_render_is_at_is_read_again_when_it_has_ended(bar: Rig) -> None:
     sync.restored()
     update()
     assert np.abs(shown(bar.skin) - native(bar.skin)).max() < 1e-5
-
-
-def test_a_frame_of_a_render_waits_for_an_update_that_is_under_way(bar: Rig) -> None:
-    import bl_ext.user_default.cage_rig.sync as sync
-
-    key_the_bar(bar)
-    scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
-    scene.frame_set(7)
-    expected, passes = shown(bar.skin).copy(), sync.session_of(bar.cage).rig.work["skin_passes"]
-    with unwatched():
-        scene.frame_set(12)
-    frame = threading.Thread(target=sync.update, args=(bar.cage, depsgraph, sync.Event.FRAME))
-    with sync._turn:
-        frame.start()
-        frame.join(0.2)
-        assert frame.is_alive() and sync.session_of(bar.cage).rig.work["skin_passes"] == passes
-    frame.join(10.0)
-    assert not frame.is_alive()
-    update()
-    assert np.abs(shown(bar.skin) - expected).max() > 0.05
-    assert sync.session_of(bar.cage).rig.work["skin_passes"] == passes + 1
