@@ -116,7 +116,7 @@ def test_loaded_coordinates_move_the_skin_at_once(bar: Rig, exchange: ModuleType
     assert np.abs(shown(bar.skin) - ours).max() > 1e-3 * bar.size
     assert bar.settings.coordinates == "a script"
     assert_uses(bar, other)
-    assert np.abs(fresh(bar)[0] - shown(bar.skin)).max() == 0.0
+    assert np.abs(shown(bar.skin) - fresh(bar)[0]).max() == 0.0
 
 
 def test_the_rest_character_stays_where_it_is(bar: Rig, exchange: ModuleType, other: Array) -> None:

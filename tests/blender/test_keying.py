@@ -310,7 +310,7 @@ def test_keying_in_edit_mode_of_either_cage(three: Rig) -> None:
     assert three.cage.mode == "EDIT"
     leave_edit_mode()
     assert np.abs(cage(three) - shape).max() < 1e-5
-    assert np.abs(fresh(three)[0] - shown(three.skin)).max() < 1e-5
+    assert np.abs(shown(three.skin) - fresh(three)[0]).max() < 1e-5
 
 
 def found(name: str) -> Rig:

@@ -118,7 +118,7 @@ def test_the_rig_goes_on_until_it_is_ready_and_is_then_what_it_would_be_at_once(
     assert choosing.progress(rig.cage) is None and rig.settings.state == "LIVE"
     bend(rig, 1.1)
     assert len(held) == 2
-    assert np.abs(fresh(rig)[0] - shown(rig.skin)).max() < 1e-6
+    assert np.abs(shown(rig.skin) - fresh(rig)[0]).max() < 1e-6
 
 
 def test_cancel_puts_the_setting_back(choosing: ModuleType, held: list[Held]) -> None:
@@ -218,7 +218,7 @@ def test_a_rig_that_is_unbound_rebound_or_deleted_meanwhile(choosing: ModuleType
     assert bpy.ops.cage_rig.rebind() == {"FINISHED"}
     update()
     assert choosing.progress(rig.cage) is None, "the rebind has computed it"
-    assert np.abs(fresh(rig)[0] - shown(rig.skin)).max() < 1e-6
+    assert np.abs(shown(rig.skin) - fresh(rig)[0]).max() < 1e-6
     for act in (bpy.ops.cage_rig.unbind, bpy.ops.object.delete):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         rig = shaped_bar()
@@ -244,7 +244,7 @@ def test_a_paused_rig_takes_it_when_it_runs_again(choosing: ModuleType, held: li
     rig.cage.update_tag()
     update()
     assert rig.settings.state == "LIVE" and choosing.progress(rig.cage) is None
-    assert np.abs(fresh(rig)[0] - shown(rig.skin)).max() < 1e-6
+    assert np.abs(shown(rig.skin) - fresh(rig)[0]).max() < 1e-6
 
 
 def test_the_add_on_may_go_meanwhile(choosing: ModuleType, held: list[Held]) -> None:

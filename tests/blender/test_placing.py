@@ -173,7 +173,7 @@ def test_a_skin_that_was_moved_stays_where_it_is(what: str) -> None:
     before = look(rig)
     apply(every(rig)[what])
     check(rig, before)
-    assert np.abs(fresh(rig)[0] - shown(rig.skin)).max() < 1e-6
+    assert np.abs(shown(rig.skin) - fresh(rig)[0]).max() < 1e-6
 
 
 def test_a_cage_that_is_moved_stays_what_it_was() -> None:

@@ -70,7 +70,7 @@ def test_one_press_repairs(bar: Rig, name: str) -> None:
     update()
     update()
     assert bar.settings.state == "LIVE" and bar.settings.fix == "", bar.settings.message
-    assert np.abs(fresh(bar)[0] - shown(bar.skin)).max() < 1e-5
+    assert np.abs(shown(bar.skin) - fresh(bar)[0]).max() < 1e-5
 
 
 def test_a_live_rig_has_nothing_to_fix(bar: Rig) -> None:
