@@ -57,11 +57,8 @@ def install(context: bpy.types.Context, cage: bpy.types.Object, bound: Bound, se
 def _join(skin: bpy.types.Object, cage: bpy.types.Object) -> None:
     settings = cage.cage_rig
     skin.cage_rig.part = "SKIN"
-    ours = modifier.find(skin, cage)
-    if ours is None:
+    if modifier.find(skin, cage) is None:
         modifier.add(skin, settings.posed_cage, stack.place(skin, settings.armature))
-    else:
-        modifier.set_inputs(ours, {"Posed Cage": settings.posed_cage})
     layers.settle(skin)
     stack.suspend_armature(skin, settings.armature)
 

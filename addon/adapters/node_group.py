@@ -54,7 +54,7 @@ def node_group(*, plain: bool = True) -> bpy.types.NodeTree:
     for group in bpy.data.node_groups:
         if is_ours(group) and group.library is None and is_plain(group) == plain and is_current(group):
             return group
-    group = bpy.data.node_groups.new(NAME if plain else f"{NAME} Whole", "GeometryNodeTree")
+    group = bpy.data.node_groups.new(NAME if plain else f"{NAME} Full", "GeometryNodeTree")
     group["cage_rig"] = True
     group.is_modifier = True
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
