@@ -366,7 +366,7 @@ def generate_cage(
     bending_nodes: ArrayLike | None = None,  # (#B, 3), near the skeleton
     options: CagingOptions | None = None,
     like: LikeCage | None = None,  # its faces are taken over, index for index
-    progress: Callable[[str, float], object] | None = None,  # stage, part; a false answer but None cancels
+    progress: Callable[[str, float], object] | None = None,  # every stage, part; a false answer but None cancels
 ) -> tuple[Doubles, NDArray[np.int64] | tuple[NDArray[np.int64], NDArray[np.int64]], CagingReport]: ...
 def cage_sections(
     vertices: ArrayLike,
@@ -386,7 +386,7 @@ def fit_cage(
     cage_faces: Faces,  # closed; taken over, index for index
     *,
     options: CagingOptions | None = None,
-    progress: Callable[[str, float], object] | None = None,  # stage, part; a false answer but None cancels
+    progress: Callable[[str, float], object] | None = None,  # every stage, part; a false answer but None cancels
 ) -> tuple[Doubles, NDArray[np.int64] | tuple[NDArray[np.int64], NDArray[np.int64]], CagingReport]: ...
 def extract_skeleton(vertices: ArrayLike, faces: Faces) -> tuple[Doubles, NDArray[np.int64]]: ...  # nodes, edges
 

@@ -66,7 +66,8 @@ def test_sections_come_without_a_cage(tube):
 
 def test_progress_is_told_and_can_cancel(tube, made):
     stages = made[-1]
-    assert stages
+    assert "growing the cage" in dict(stages)
+    assert stages[-1][0] == "checking the cage"
     assert all(0 <= part <= 1 for _, part in stages)
     with pytest.raises(core.CagingError) as refused:
         core.generate_cage(*tube, progress=lambda stage, part: False)

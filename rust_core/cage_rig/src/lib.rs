@@ -43,7 +43,7 @@ pub use error::{CageError, CagingError, Error, PoseError, SkeletonError, SkinErr
 pub use mesh::Polygons;
 pub use panels::Precision;
 pub use points::{bounding_diagonal, Matrix3, Point, Transform, LARGEST};
-pub use progress::{unwatched, Cancelled, Part, Progress};
+pub use progress::{unwatched, Cancelled, Part, Progress, Stage};
 pub use rows::Rows;
 pub use skeleton::Skeleton;
 pub use sync::CoupledRig;

@@ -6,7 +6,7 @@
 //! that was made is dropped on the way. A step costs two atomic additions; take one per millisecond.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use thiserror::Error;
 
 /// Work was cancelled; nothing of it is left.
@@ -23,12 +23,15 @@ pub fn unwatched<T>(work: impl Fn(&Part) -> Result<T, Cancelled>) -> T {
     }
 }
 
+/// What is computed, in words for people, and the share of the work that was done before it.
+pub type Stage = (&'static str, f64);
+
 /// How far some work is, and whether it shall stop.
 #[derive(Debug, Default)]
 pub struct Progress {
     /// Bits of the share: those of positive numbers are in their order.
     share: AtomicU64,
-    stage: Mutex<&'static str>,
+    stages: Mutex<Vec<Stage>>,
     cancelled: AtomicBool,
 }
 
@@ -40,7 +43,21 @@ impl Progress {
 
     /// What is being computed, in words for people; empty before the work begins.
     pub fn stage(&self) -> &'static str {
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+        self.stages().last().map_or("", |&(name, _)| name)
+    }
+
+    /// The stages that began, from the one of that number on; the last with the share that is done now.
+    pub fn stages_from(&self, first: usize) -> Vec<Stage> {
+        let stages = self.stages();
+        let mut found = stages.get(first..).unwrap_or_default().to_vec();
+        if let Some((_, share)) = found.last_mut() {
+            *share = self.share();
+        }
+        found
+    }
+
+    fn stages(&self) -> MutexGuard<'_, Vec<Stage>> {
+        self.stages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Asks the work to stop.
@@ -82,7 +99,7 @@ impl<'a> Part<'a> {
 
     /// Begins this part, which is called `stage`.
     pub fn begin(&self, stage: &'static str) -> Result<(), Cancelled> {
-        *self.progress.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage;
+        self.progress.stages().push((stage, self.start));
         self.reach(0.0)
     }
 
@@ -143,9 +160,11 @@ mod tests {
         assert_eq!(seen, [0.0, 0.0625, 0.125, 0.1875, 0.25]);
         b.begin("two").and_then(|()| c.begin("three")).expect("not cancelled");
         assert_eq!((progress.stage(), progress.share()), ("three", 0.25));
+        assert_eq!(progress.stages_from(1), [("two", 0.25), ("three", 0.25)]);
         let [_, last] = c.split([1.0, 1.0]);
         last.reach(0.0).and_then(|()| last.reach(2.0)).expect("not cancelled");
-        assert_eq!(progress.share(), 1.0);
+        assert_eq!(progress.stages_from(2), [("three", 1.0)]);
+        assert_eq!(progress.stages_from(3), []);
         a.reach(0.5).expect("not cancelled");
         assert_eq!(progress.share(), 1.0, "the share never falls");
     }

@@ -7,7 +7,7 @@ use cage_rig::caging::{
     CageReport, CagingOptions, Earlier, GeneratedCage, Generator, NodeKind, Placement, Repairs, RoughCage,
     SectionReport, Template,
 };
-use cage_rig::{CagingError, Error, Point, Polygons, Progress};
+use cage_rig::{CagingError, Error, Point, Polygons, Progress, Stage};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
@@ -74,24 +74,33 @@ impl CagingJob {
         Ok(Self(Job::start(work, Arc::new)?))
     }
 
-    /// Waits for the result, telling a function of Python how far it is, which may cancel it.
+    /// Waits for the result, telling a function of Python how far it is, which may cancel it. The function
+    /// learns of every stage, however short.
     fn watched<'py>(
         &self,
         py: Python<'py>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let mut told = None;
-        while !self.wait(py, progress.map(|_| TELLING))? {
-            let Some(call) = progress else { continue };
-            let news = (self.stage(), self.progress());
-            if !news.0.is_empty() && told.replace(news) != Some(news) {
-                let answer = call.call1(news)?;
-                if !answer.is_none() && !answer.is_truthy()? {
-                    return Err(cancelled(py));
+        let Some(call) = progress else { return self.result(py) };
+        let (mut last, mut told) = (0, None::<Stage>);
+        loop {
+            let found = if self.wait(py, Some(TELLING))? { Some(self.result(py)?) } else { None };
+            let news = self.0.stages_from(last);
+            last += news.len().saturating_sub(1);
+            for news in news {
+                // The stage that was told last may come again as it began.
+                if told.is_none_or(|told| told != news && told.1 <= news.1) {
+                    told = Some(news);
+                    let answer = call.call1(news)?;
+                    if !answer.is_none() && !answer.is_truthy()? {
+                        return Err(cancelled(py));
+                    }
                 }
             }
+            if let Some(found) = found {
+                return Ok(found);
+            }
         }
-        self.result(py)
     }
 }
 

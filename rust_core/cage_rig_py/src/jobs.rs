@@ -7,7 +7,7 @@ use crate::errors::raise;
 use crate::input::{read_input, Given, Meshes};
 use crate::rig::CoupledRig;
 use cage_rig::skinning::SkinningMethod;
-use cage_rig::{Error, Progress};
+use cage_rig::{Error, Progress, Stage};
 use pyo3::panic::PanicException;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -110,6 +110,10 @@ impl<T: Clone + Send + 'static> Job<T> {
 
     pub(crate) fn stage(&self) -> &'static str {
         self.0.progress.stage()
+    }
+
+    pub(crate) fn stages_from(&self, first: usize) -> Vec<Stage> {
+        self.0.progress.stages_from(first)
     }
 
     /// Has no effect on what is done.
