@@ -13,18 +13,14 @@ import numpy as np
 ROOT = Path(__file__).parent.parent.parent
 sys.path[:0] = [str(Path(__file__).parent), str(ROOT), str(ROOT / "tests/blender")]
 import driver
+from long_work import call, call_and_leave, to_the_end, under_way
 from rough import decimated
-from scene import file_state, rest
+from scene import rest
 
 from blend_fixtures.build import RigObjects, build_character
 from blend_fixtures.doll import doll
 
 LOOK = 0.8
-MODULE = "bl_ext.user_default.cage_rig"
-
-
-def under_way() -> bool:
-    return bool(sys.modules[f"{MODULE}.operators.waiting"]._open)
 
 
 def character() -> tuple[RigObjects, bpy.types.Object]:
@@ -50,54 +46,10 @@ def choose(rig: RigObjects, cage: bpy.types.Object) -> None:
     bpy.context.view_layer.objects.active = cage
 
 
-def call_fit() -> Iterator[float | None]:
-    driver.key("F3")
-    yield 0.7
-    driver.type_text("fit cage")
-    yield 1.0
-    driver.key("RET")
-    for _ in range(100):
-        yield 0.1
-        if under_way():
-            return
-
-
-def to_the_end(name: str) -> Iterator[float | None]:
-    for step in range(600):
-        yield 0.1
-        if step == 5:
-            driver.screenshot(name)
-        if not under_way():
-            break
-    yield LOOK
-
-
-def escape() -> Iterator[float | None]:
-    before = file_state()
-    yield from call_fit()
-    driver.check("the fit goes on beside the window", under_way())
-    yield 0.4
-    driver.screenshot("1_on_its_way")
-    region = driver.view()[0].spaces.active.region_3d
-    distance = region.view_distance
-    driver.key("WHEELUPMOUSE")
-    driver.key("X")
-    yield 0.2
-    driver.check("the view can be moved meanwhile", region.view_distance < distance)
-    driver.check("nothing is written yet", under_way() and file_state() == before)
-    driver.key("ESC")
-    yield 1.0
-    driver.check("Esc ends it", not under_way())
-    driver.check("and nothing has changed", file_state() == before)
-    header = bpy.types.STATUSBAR_HT_header
-    driver.check("the status bar is Blender's again", header.draw == header._draw_orig)
-    driver.screenshot("2_cancelled")
-
-
 def fit_and_adjust(cage: bpy.types.Object) -> Iterator[float | None]:
     name, start = cage.name, rest(cage)
-    yield from call_fit()
-    yield from to_the_end("3_on_its_way")
+    yield from call("fit cage")
+    yield from to_the_end("3_on_its_way", (5,))
     fitted = rest(bpy.data.objects[name])
     driver.check("the cage is fitted", not np.array_equal(fitted, start))
     driver.screenshot("4_fitted")
@@ -151,7 +103,7 @@ def hole() -> Iterator[float | None]:
     choose(rig, cage)
     start = rest(cage)
     yield LOOK
-    yield from call_fit()
+    yield from call("fit cage")
     yield 1.0
     driver.screenshot("8_dialog")
     driver.check("nothing is done before the answer", not under_way() and np.array_equal(rest(cage), start))
@@ -159,7 +111,7 @@ def hole() -> Iterator[float | None]:
     driver.check("the hole is selected", 0 < len(picked) < len(rig.skins[0].data.vertices), len(picked))
     driver.key("RET")
     yield 1.0
-    yield from to_the_end("9_hull_on_its_way")
+    yield from to_the_end("9_hull_on_its_way", (5,))
     driver.screenshot("9_hull")
     driver.check("the cage goes around the repaired hull", not np.array_equal(rest(bpy.data.objects["Rough"]), start))
 
@@ -174,7 +126,7 @@ def acts() -> Iterator[float | None]:
     driver.show_tab()
     yield LOOK
     driver.screenshot("0_rough")
-    yield from escape()
+    yield from call_and_leave("fit cage", "ESC")
     yield from fit_and_adjust(cage)
     yield from hole()
 

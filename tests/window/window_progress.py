@@ -14,20 +14,17 @@ import numpy as np
 ROOT = Path(__file__).parent.parent.parent
 sys.path[:0] = [str(Path(__file__).parent), str(ROOT), str(ROOT / "tests/blender")]
 import driver
+from long_work import MODULE, call, call_and_leave, status_bar_is_blenders, to_the_end, under_way
 from scene import file_state, shown
 
 from blend_fixtures.bar import bar, box_cage
 from blend_fixtures.build import build_character
 
-MODULE = "bl_ext.user_default.cage_rig"
+BIND = "bind cage rig"
 
 
 def ours(name: str) -> ModuleType:
     return sys.modules[f"{MODULE}.{name}"]
-
-
-def under_way() -> bool:
-    return bool(ours("operators.waiting")._open)
 
 
 def acts() -> Iterator[float | None]:
@@ -49,7 +46,9 @@ def acts() -> Iterator[float | None]:
     yield 1.0
     vertices = len(objects.skins[0].data.vertices)
     driver.check("the mesh is large", vertices > 190_000, vertices)
-    yield from bind_and_escape()
+    for way_out in ("ESC", "RIGHTMOUSE"):
+        yield from call_and_leave(BIND, way_out)
+        yield 2.0
     yield from the_add_on_goes()
     yield from bind_to_the_end()
     yield from choose_and_cancel()
@@ -57,52 +56,14 @@ def acts() -> Iterator[float | None]:
     yield from one_undo_each()
 
 
-def call_bind() -> Iterator[float | None]:
-    driver.key("F3")
-    yield 0.7
-    driver.type_text("bind cage rig")
-    yield 1.0
-    driver.key("RET")
-    for _ in range(100):
-        yield 0.1
-        if under_way():
-            return
-
-
-def bind_and_escape() -> Iterator[float | None]:
-    before = file_state()
-    for name, way_out in (("esc", "ESC"), ("right_mouse", "RIGHTMOUSE")):
-        yield from call_bind()
-        driver.check("the bind goes on beside the window", under_way())
-        yield 0.6
-        driver.screenshot(f"1_on_its_way_{name}")
-        region = driver.view()[0].spaces.active.region_3d
-        distance = region.view_distance
-        driver.key("WHEELUPMOUSE")
-        driver.key("X")
-        yield 0.3
-        driver.check("the view can be moved meanwhile", region.view_distance < distance)
-        driver.check("it is still under way", under_way())
-        driver.check("nothing is written yet", file_state() == before)
-        driver.key(way_out)
-        yield 1.0
-        driver.check(f"{way_out} ends it", not under_way())
-        driver.check("and nothing has changed", file_state() == before)
-        header = bpy.types.STATUSBAR_HT_header
-        driver.check("the status bar is Blender's again", header.draw == header._draw_orig)
-        yield 2.0
-        driver.screenshot(f"2_cancelled_{name}")
-
-
 def the_add_on_goes() -> Iterator[float | None]:
     before = file_state()
-    yield from call_bind()
+    yield from call(BIND)
     yield 0.5
     driver.check("a bind is under way", under_way())
     bpy.ops.preferences.addon_disable(module=MODULE)
     yield 1.5
-    header = bpy.types.STATUSBAR_HT_header
-    driver.check("the add-on may go meanwhile", not under_way() and header.draw == header._draw_orig)
+    driver.check("the add-on may go meanwhile", not under_way() and status_bar_is_blenders())
     driver.key("A")  # a window that a modal operator still held would not hear it
     yield 0.5
     bpy.ops.preferences.addon_enable(module=MODULE)
@@ -114,14 +75,8 @@ def the_add_on_goes() -> Iterator[float | None]:
 
 
 def bind_to_the_end() -> Iterator[float | None]:
-    yield from call_bind()
-    for step in range(600):
-        yield 0.1
-        if step in (5, 15, 25):
-            driver.screenshot(f"3_stage_{step}")
-        if not under_way():
-            break
-    yield 1.0
+    yield from call(BIND)
+    yield from to_the_end("3_stage", (5, 15, 25))
     cage = bpy.data.objects["BarCage"]
     driver.check("it comes to its end", cage.cage_rig.state == "LIVE", cage.cage_rig.message)
     bone = bpy.data.objects["BarRig"].pose.bones["upper"]
