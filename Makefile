@@ -35,7 +35,6 @@ bench: $(VENV)/.extension $(VENV)/.bench
 	$(PY) tests/bench/bench_core.py
 	$(PY) tests/bench/bench_rust.py
 	$(PY) tests/bench/report.py
-	cargo bench --quiet -p cage_rig --bench skinning
 	$(PY) tests/bench/bench_caging.py
 	$(PY) tests/bench/bench_fitting.py
 

@@ -22,7 +22,7 @@ def rows_of(output: str) -> list[Row]:
 
 
 def main() -> None:
-    for bench in ("frames", "binding"):
+    for bench in ("frames", "binding", "skinning"):
         command = ["cargo", "bench", "--quiet", "-p", "cage_rig", "--bench", bench]
         done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
         print("\n".join(line for line in done.stdout.splitlines() if not line.startswith("row\t")))

@@ -15,6 +15,7 @@ BENCHES = {
     "core": "The core, from Python",
     "frames": "Kernels",
     "binding": "Binds and edits of the posed cage",
+    "skinning": "Centers of rotation",
 }
 HEAD = """# Figures
 

@@ -4,7 +4,8 @@
 //!   paper's columns only one number is at hand: its joint coordinates of the largest rig took 46.8 s. They are an
 //!   integral over all faces for every joint, so beside the other sizes stands what that makes for them.
 //! - parts: what coordinates, anchors and joint coordinates of the largest of them take alone.
-//! - drag: the first edit of the posed cage after a pose and the next ones, with few joints bent and with all.
+//! - refresh: Eq. (19) for another pose, which the first edit waits for, by low rank beside the full LU, and by the latter alone.
+//! - drag: the first edit of the posed cage after a pose and the next ones, with few joints bent, with half and with all.
 //! - snake: 119,802 vertices, 98 joints, a cage of 44; the paper's largest rig.
 //! - worm: 24,000 vertices, 52 joints, a cage of 120; a fine cage on a character for games.
 //!
@@ -18,10 +19,13 @@ mod common;
 
 use cage_rig::coordinates::mean_value;
 use cage_rig::skinning::method;
+use cage_rig::sync::cage_reverser::CageReverser;
+use cage_rig::sync::cage_updater::CageUpdater;
 use cage_rig::sync::joint_coordinates::{joint_coordinates, SkinAtRest};
 use cage_rig::sync::maxvol::{maxvol, MaxVolOptions};
+use cage_rig::sync::skeleton_updater::SkeletonUpdater;
 use cage_rig::sync::BindInput;
-use cage_rig::{unwatched, CoupledRig, Error, Point, Progress, Transform};
+use cage_rig::{unwatched, CoupledRig, Error, Matrix3, Point, Progress, Transform};
 use common::large::snake;
 use std::time::{Duration, Instant};
 
@@ -219,7 +223,60 @@ fn as_printed(point: &Point, vertices: &[Point], faces: &[[u32; 3]]) -> Vec<f64>
     weights
 }
 
-/// Every joint from `bent` on is turned a little more than its parent.
+/// The `bent` joints in the middle are turned against their parents, a little more in every round.
+fn bent_pose(joints: &[Point], bent: usize, round: u32) -> Vec<Transform> {
+    let mut pose = vec![Transform::identity(); joints.len()];
+    let first = (joints.len() - bent).div_ceil(2);
+    for j in 1..joints.len() {
+        let turn = if (first..first + bent).contains(&j) { 0.02 + 0.001 * f64::from(round) } else { 0.0 };
+        let local = common::turn(joints[j], Point::new(0.2, 0.1, 1.0), turn);
+        pose[j] = common::compose(&pose[j - 1], &local);
+    }
+    pose
+}
+
+/// What Eq. (19) takes for another pose, as it is chosen, and by the full LU.
+fn refresh(name: &str, input: &BindInput, bent: usize) {
+    let rig = CoupledRig::new(BindInput { method: method("lbs").expect("it is there"), ..input.clone() })
+        .expect("a tube binds");
+    let reach = vec![1.0; input.skin_vertices.len()];
+    let skin = SkinAtRest {
+        vertices: &input.skin_vertices,
+        triangles: &[],
+        weights: &input.skin_weights,
+        cage_coords: rig.cage_coords(),
+        reach: &reach,
+    };
+    let (cage, limit) = (rig.cage().vertices(), input.options.min_singular);
+    let updater = unwatched(|part| CageUpdater::new(rig.anchors(), &skin, cage, limit, part));
+    let skeleton = SkeletonUpdater::new(input.skeleton.clone(), rig.joint_coords().clone());
+    let linear: Vec<Matrix3> = bent_pose(rig.joints(), bent, 1).iter().map(|t| t.linear).collect();
+    let shares = vec![1.0; linear.len()];
+    let (mut chosen_time, mut dense_time) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..40 {
+        let (time, chosen) = best(1, || CageReverser::new(&updater, &skeleton, &linear, &shares));
+        chosen_time = chosen_time.min(time);
+        let (time, dense) = best(1, || CageReverser::dense(&updater, &skeleton, &linear, &shares));
+        dense_time = dense_time.min(time);
+        let (chosen, dense) = (chosen.expect("a solvable pose"), dense.expect("a solvable pose"));
+        assert_eq!(chosen.is_low_rank(), 3 * bent <= cage.len());
+        let step: Vec<Point> = cage.iter().map(|c| c * 1e-3).collect();
+        let (found, expected) = (chosen.solve(&updater, &step), dense.solve(&updater, &step));
+        let miss = found.iter().zip(&expected).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(miss < 1e-9 * rig.size(), "{miss}");
+    }
+    let (what, peer, beside) = if 3 * bent <= cage.len() {
+        ("low rank", dense_time.to_string(), "the full LU")
+    } else {
+        ("full LU", "-".to_owned(), "-")
+    };
+    let why = "the first edit after a pose waits for it";
+    println!(
+        "row\trefresh of the posed cage's edits, {what}: {name}\t{why}\t{chosen_time}\t{peer}\t{beside}\t-"
+    );
+    println!("refresh {name}: {chosen_time:.3} ms by {what}, full LU {dense_time:.3} ms");
+}
+
 fn drag(name: &str, input: BindInput, bent: usize) {
     let input = BindInput { method: method("lbs").expect("it is there"), ..input };
     let mut rig = CoupledRig::new(input).expect("a tube binds");
@@ -227,16 +284,7 @@ fn drag(name: &str, input: BindInput, bent: usize) {
     let mut first = f64::INFINITY;
     let mut next = f64::INFINITY;
     for round in 1..=20 {
-        let mut pose = vec![Transform::identity(); joints.len()];
-        for j in 1..joints.len() {
-            let turn = if j > joints.len() / 2 && j <= joints.len() / 2 + bent {
-                0.02 + 0.001 * f64::from(round)
-            } else {
-                0.0
-            };
-            let local = common::turn(joints[j], Point::new(0.2, 0.1, 1.0), turn);
-            pose[j] = common::compose(&pose[j - 1], &local);
-        }
+        let pose = bent_pose(&joints, bent, round);
         rig.pose(&pose, None).expect("a pose");
         for edit in 0..10 {
             let wanted: Vec<Point> = rig.posed_cage().iter().map(|c| c * 1.001).collect();
@@ -264,8 +312,12 @@ fn drag(name: &str, input: BindInput, bent: usize) {
 
 fn main() {
     parts();
-    drag("cage of 104, 5 of 64 joints bent", snake(164, 40, 64, 26), 5);
-    drag("cage of 104, 31 of 64 joints bent", snake(164, 40, 64, 26), 31);
+    for bent in [5, 10, 63] {
+        refresh(&format!("cage of 104, {bent} of 64 joints bent"), &snake(164, 40, 64, 26), bent);
+    }
+    for bent in [5, 31, 63] {
+        drag(&format!("cage of 104, {bent} of 64 joints bent"), snake(164, 40, 64, 26), bent);
+    }
     drag("cage of 352, 10 of 64 joints bent", snake(400, 60, 64, 88), 10);
     rows();
     scenario("snake", &snake(1461, 82, 98, 11));

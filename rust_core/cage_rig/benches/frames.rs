@@ -1,7 +1,7 @@
 //! What frames cost, against the limits of the machine: `cargo bench -p cage_rig --bench frames`.
 //!
 //! Every figure is the least of many rounds in which a scenario, what it is compared with and both limits take turns,
-//! so that all see the same machine. One thread, but where threads are named.
+//! so that all see the same machine. One thread, but where threads are named. What they answer is checked.
 //!
 //! - product: M = M₀ + Φ(C − C₀) for a coarse character, whose Φ stays in the caches, up to one that is bound by memory;
 //!   then a drag of one and of five cage vertices, a cage between two keys, 16-bit weights, and four frames at once as
@@ -108,7 +108,28 @@ fn keyed<'a>(cage: &'a mut [Point], bound: &[Point], part: f64) -> &'a [Point] {
     cage
 }
 
+/// How far the rest skin of `rig` is from M₀ + Φ(C − C₀) in 64 bits at worst, and how far that moves at most, both in
+/// parts of the size. `rest`: M₀.
+fn off(rig: &mut CoupledRig, rest: &[Point]) -> (f64, f64) {
+    let found = rig.rest_skin().to_vec();
+    let moved: Vec<Point> = rig.rest_cage().iter().zip(rig.cage().vertices()).map(|(c, c0)| c - c0).collect();
+    let (mut miss, mut most) = (0.0, 0.0);
+    for (i, (found, rest)) in found.iter().zip(rest).enumerate() {
+        let step = rig.cage_coords().combine(i, &moved);
+        miss = f64::max(miss, (Point::from(found.map(f64::from)) - rest - step).norm());
+        most = f64::max(most, step.norm());
+    }
+    (miss / rig.size(), most / rig.size())
+}
+
+/// The rest skin is right to the rounding of 32 bits, and `part` of what the cage moves it by.
+fn check(rig: &mut CoupledRig, rest: &[Point], part: f64) {
+    let (miss, most) = off(rig, rest);
+    assert!(miss < 1e-6 + part * most, "off by {miss:e} of the size where {most} is moved");
+}
+
 fn product(character: (usize, usize, usize)) {
+    let rest = input(character).skin_vertices;
     let mut rig = CoupledRig::new(input(character)).expect("it binds");
     let mut half = input(character);
     half.options.precision = Precision::Half;
@@ -120,7 +141,7 @@ fn product(character: (usize, usize, usize)) {
     let mut least = [Least(f64::INFINITY); 10];
     let (bound, mut line, mut random) = (cage.clone(), cage.clone(), Random::new(1));
     let operations = arch.dispatch(MultiplyAdds(10_000)).1;
-    for _ in 0..(4_000_000_000 / (rows * columns * 40)).clamp(60, 1000) {
+    for round in 0..(4_000_000_000 / (rows * columns * 40)).clamp(60, 1000) {
         least[0].of(|| arch.dispatch(Read(black_box(&memory))));
         least[1].of(|| arch.dispatch(MultiplyAdds(black_box(10_000))));
         for (at, moved) in [(2, columns), (3, 1), (4, 5)] {
@@ -129,15 +150,24 @@ fn product(character: (usize, usize, usize)) {
                 rig.edit_rest_cage(dragged(&mut cage, moved, &mut random)).expect("a valid cage");
                 least[at].of(|| rig.rest_skin()[0]);
             }
+            if round == 0 {
+                check(&mut rig, &rest, 0.0);
+            }
         }
         // Seen, known, and read twice.
         for k in 1..5 {
             rig.edit_rest_cage(keyed(&mut line, &bound, f64::from(k))).expect("a valid cage");
             least[9].of(|| rig.rest_skin()[0]);
         }
+        if round == 0 {
+            check(&mut rig, &rest, 0.0);
+        }
         for _ in 0..3 {
             half.edit_rest_cage(dragged(&mut cage, columns, &mut random)).expect("a valid cage");
             least[5].of(|| half.rest_skin()[0]);
+        }
+        if round == 0 {
+            check(&mut half, &rest, 2e-4);
         }
         let cages: Vec<Vec<Point>> =
             (0..4).map(|_| dragged(&mut cage, columns, &mut random).to_vec()).collect();
@@ -145,6 +175,17 @@ fn product(character: (usize, usize, usize)) {
         let same: Vec<Frame> = (0..4).map(|_| frames[0]).collect();
         for _ in 0..3 {
             least[6].of(|| rig.posed_skins(&frames, None, &mut posed));
+        }
+        if round == 0 {
+            let mut alone = vec![[0.0f32; 3]; rows];
+            for (frame, together) in frames.chunks(1).zip(posed.chunks(rows)) {
+                rig.posed_skins(frame, None, &mut alone).expect("a valid frame");
+                let miss = alone.iter().flatten().zip(together.iter().flatten()).map(|(a, b)| (a - b).abs());
+                assert!(
+                    miss.fold(0.0, f32::max) < 1e-6 * rig.size() as f32,
+                    "four frames are not four frames"
+                );
+            }
         }
         for _ in 0..3 {
             least[7].of(|| rig.posed_skins(&same, None, &mut posed));
@@ -178,6 +219,13 @@ fn product(character: (usize, usize, usize)) {
     }
     // Four frames of one cage have one product, and four skinnings each.
     let together = (four - four_same) + whole;
+    for (what, time, peer, beside) in [
+        ("product of one of four frames at once", together / 4.0, whole, "the product of a frame alone"),
+        ("one of four frames at once", four / 4.0, single, "a frame alone"),
+    ] {
+        let (time, peer) = (time * 1e3, peer * 1e3);
+        println!("row\t{what}, one thread: {size}\tbakes read Φ once for four\t{time}\t{peer}\t{beside}\t-");
+    }
     println!(
         "  drag of one {:.1}, of five {:.1}, keyed {:.1} times cheaper; 16 bits {:.2} times; four at once: product {:.2}, posed {:.2} times",
         whole / one,
@@ -230,6 +278,7 @@ fn frames(character: (usize, usize, usize)) {
                 rig.posed_skin();
                 rig.posed_cage()[0]
             });
+            assert!(rig.posed_skin().iter().flatten().all(|x| x.is_finite()));
         };
         single.install(|| frame(0, 0));
         frame(1, 0);
